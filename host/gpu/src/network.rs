@@ -24,8 +24,8 @@ pub use tensor::Product;
 use crate::Buffer;
 use crate::engine::{Engine, upload_halves};
 use cubecl::prelude::*;
-use half::f16;
 use finish::Ending;
+use half::f16;
 use kernels::{ROWS, Shape, UNITS};
 use plan::{COLUMNS, DEPTH, Geometry, pixels_a_unit};
 use tiles::{Columns, Tiles};
@@ -51,9 +51,6 @@ pub struct Products {
     pub planes: usize,
     /// The output channels of a workgroup.
     pub columns: Columns,
-    /// Number of products below each other in a warp, 2 or 4; `None` for what suits the number of
-    /// frames.
-    pub down: Option<usize>,
     /// The weights, by [`Convolve::narrow`]. For each workgroup's output channels, each step of
     /// [`STEP`](tiles::STEP) input channels and each tap, there is a row for each output channel;
     /// [`half_at`](tiles::half_at) says where each half of a row lies.
@@ -140,8 +137,8 @@ pub struct Finish<'a> {
     pub clamp: bool,
     /// Also store SiLU of the output.
     pub activated: bool,
-    /// Leave the tensor cores alone.
-    pub plain: bool,
+    /// Which kernel computes.
+    pub way: Way,
 }
 
 impl Default for Finish<'_> {
@@ -153,9 +150,20 @@ impl Default for Finish<'_> {
             shuffle: false,
             clamp: false,
             activated: false,
-            plain: false,
+            way: Way::Best,
         }
     }
+}
+
+/// Which kernel computes a convolution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// Products of small matrices, if the layer has them and the images fit their tiles.
+    Best,
+    /// The same, with this number of products below each other in a warp, 2 or 4.
+    Products(usize),
+    /// The kernel that does without them.
+    Plain,
 }
 
 /// The output of a convolution.
@@ -324,11 +332,15 @@ impl<R: Runtime> Convolve for ComputeClient<R> {
         let out = Engine::empty(self, count);
         let activated = Engine::empty(self, if finish.activated { count } else { 1 });
         let addend = addend.unwrap_or(&layer.table);
-        let tiled = layer.products.as_ref().filter(|_| !finish.plain).and_then(|products| {
-            let Products { columns, planes, down, .. } = *products;
+        let tiled = layer.products.as_ref().and_then(|products| {
+            let Products { columns, planes, .. } = *products;
             let limits = Engine::limits(self);
             let tiles = Tiles::new(&geometry, columns, (frames, side), planes, &limits)?;
-            Some((products, down.map_or(tiles, |down| tiles.with_down(down, &limits))))
+            match finish.way {
+                Way::Best => Some((products, tiles)),
+                Way::Products(down) => Some((products, tiles.with_down(down, &limits))),
+                Way::Plain => None,
+            }
         });
         if let Some((products, tiles)) = tiled {
             let run = Run { input, film, addend, out: &out, activated: &activated };

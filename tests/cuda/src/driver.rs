@@ -248,9 +248,8 @@ pub unsafe extern "C" fn cuLaunchKernel(
     let mut parameters = vec![0; kernel.parameter_bytes()];
     for (index, parameter) in kernel.parameters.iter().enumerate() {
         // SAFETY: the caller gives as many arguments as the kernel has parameters, of their sizes.
-        let argument = unsafe {
-            slice::from_raw_parts((*arguments.add(index)).cast::<u8>(), parameter.bytes)
-        };
+        let argument =
+            unsafe { slice::from_raw_parts((*arguments.add(index)).cast::<u8>(), parameter.bytes) };
         parameters[parameter.at..][..parameter.bytes].copy_from_slice(argument);
     }
     let work = Launch {

@@ -179,11 +179,8 @@ impl Reader {
         let (name, count) = array(words.last().copied().unwrap_or_default());
         let kind = words.iter().rev().nth(1).copied().unwrap_or_default();
         let bytes = bytes_of(kind)? * count.unwrap_or(0);
-        let total = if words.contains(&".local") {
-            &mut self.local_bytes
-        } else {
-            &mut self.shared_bytes
-        };
+        let total =
+            if words.contains(&".local") { &mut self.local_bytes } else { &mut self.shared_bytes };
         let at = total.next_multiple_of(align);
         *total = at + bytes;
         self.names.insert(name.to_owned(), at as u64);
@@ -238,8 +235,8 @@ impl Reader {
         let inside = text.trim().trim_start_matches('[').trim_end_matches(']');
         match inside.split_once('+') {
             Some((place, distance)) => {
-                let distance = constant(distance.trim())
-                    .ok_or_else(|| Unknown(format!("address {text}")))?;
+                let distance =
+                    constant(distance.trim()).ok_or_else(|| Unknown(format!("address {text}")))?;
                 Ok((self.place(place)?, distance))
             }
             None => Ok((self.place(inside)?, 0)),

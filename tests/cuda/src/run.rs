@@ -7,7 +7,7 @@
 
 mod arithmetic;
 
-use crate::ptx::{Instruction, Kernel, Memory, Op, Place, Space, Unknown};
+use crate::ptx::{Instruction, Kernel, Kind, Memory, Op, Place, Space, Unknown};
 use arithmetic::{compute, f16_at};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -95,15 +95,16 @@ impl<'a> Group<'a> {
     fn new(work: &'a Launch<'a>, number: u32) -> Self {
         let [x, y, _] = work.groups;
         let units = work.units.iter().product::<u32>();
-        let warp = |first| Warp {
-            first,
-            registers: vec![[0; WARP]; work.kernel.registers],
-            next: std::array::from_fn(|lane| {
-                if first + (lane as u32) < units { 0 } else { usize::MAX }
-            }),
-            waiting: [false; WARP],
-            local: vec![0; work.kernel.local_bytes * WARP],
-        };
+        let warp =
+            |first| Warp {
+                first,
+                registers: vec![[0; WARP]; work.kernel.registers],
+                next: std::array::from_fn(|lane| {
+                    if first + (lane as u32) < units { 0 } else { usize::MAX }
+                }),
+                waiting: [false; WARP],
+                local: vec![0; work.kernel.local_bytes * WARP],
+            };
         Self {
             work,
             number: [number % x, number / x % y, number / x / y],
@@ -141,7 +142,8 @@ impl<'a> Group<'a> {
             let active: [bool; WARP] =
                 std::array::from_fn(|lane| runs(&lane) && warp.next[lane] == at);
             // Other units wait at a later instruction; here they are met again.
-            let meets = (0..WARP).filter(runs).map(|lane| warp.next[lane]).filter(|&n| n > at).min();
+            let meets =
+                (0..WARP).filter(runs).map(|lane| warp.next[lane]).filter(|&n| n > at).min();
             self.straight(warp, kernel, active, at, meets.unwrap_or(usize::MAX))?;
         }
     }
@@ -187,14 +189,22 @@ impl<'a> Group<'a> {
         Ok(())
     }
 
+    #[inline]
     fn value(&self, warp: &Warp, place: Place) -> Lanes {
+        match place {
+            Place::Register(register) => warp.registers[register],
+            Place::Constant(value) => [value; WARP],
+            other => self.special(warp, other),
+        }
+    }
+
+    fn special(&self, warp: &Warp, place: Place) -> Lanes {
         let [x, y, _] = self.work.units;
         let each = |of: &dyn Fn(u32) -> u32| -> Lanes {
             std::array::from_fn(|lane| u64::from(of(warp.first + lane as u32)))
         };
         match place {
-            Place::Register(register) => warp.registers[register],
-            Place::Constant(value) => [value; WARP],
+            Place::Register(_) | Place::Constant(_) => [0; WARP],
             Place::Unit(0) => each(&|unit| unit % x),
             Place::Unit(1) => each(&|unit| unit / x % y),
             Place::Unit(_) => each(&|unit| unit / x / y),
@@ -222,7 +232,7 @@ impl<'a> Group<'a> {
                         let distance = memory.distance.wrapping_add((part * bytes) as u64);
                         let address = addresses[lane].wrapping_add(distance);
                         let mut number = self.read(warp, memory.space, address, bytes, lane)?;
-                        if let crate::ptx::Kind::Signed(bytes) = instruction.kind {
+                        if let Kind::Signed(bytes) = instruction.kind {
                             let unused = 64 - 8 * bytes as u32;
                             number = ((number << unused) as i64 >> unused) as u64;
                         }
@@ -238,7 +248,13 @@ impl<'a> Group<'a> {
                     for lane in lanes.clone() {
                         let distance = memory.distance.wrapping_add((part * bytes) as u64);
                         let address = addresses[lane].wrapping_add(distance);
-                        self.write(warp, memory.space, address, &numbers[lane].to_le_bytes()[..bytes], lane)?;
+                        self.write(
+                            warp,
+                            memory.space,
+                            address,
+                            &numbers[lane].to_le_bytes()[..bytes],
+                            lane,
+                        )?;
                     }
                 }
             }
@@ -270,13 +286,18 @@ impl<'a> Group<'a> {
                 }
             }
             op => {
-                let from: [Lanes; 4] = std::array::from_fn(|index| {
-                    instruction.from.get(index).map_or([0; WARP], |&place| self.value(warp, place))
+                let mut from = [[0; WARP]; 4];
+                for (numbers, &place) in from.iter_mut().zip(&instruction.from) {
+                    *numbers = self.value(warp, place);
+                }
+                let results = usual(op, instruction.kind, &from).unwrap_or_else(|| {
+                    std::array::from_fn(|lane| {
+                        compute(op, instruction.kind, from.map(|numbers| numbers[lane]))
+                    })
                 });
                 let to = &mut warp.registers[instruction.to[0]];
                 for lane in lanes {
-                    let numbers = std::array::from_fn(|index| from[index][lane]);
-                    to[lane] = compute(op, instruction.kind, numbers);
+                    to[lane] = results[lane];
                 }
             }
         }
@@ -321,7 +342,11 @@ impl<'a> Group<'a> {
             Space::Global => {
                 // SAFETY: the kernel writes where the host allows it, as on a GPU.
                 unsafe {
-                    std::ptr::copy_nonoverlapping(number.as_ptr(), address as *mut u8, number.len());
+                    std::ptr::copy_nonoverlapping(
+                        number.as_ptr(),
+                        address as *mut u8,
+                        number.len(),
+                    );
                 }
                 return Ok(());
             }
@@ -337,12 +362,7 @@ impl<'a> Group<'a> {
     /// `ldmatrix`: matrices of 8 x 8 numbers of 16 bits. Unit `8 m + r` names the address of row `r`
     /// of matrix `m`; afterwards unit `4 r + c` has columns `2 c` and `2 c + 1` of row `r` of each
     /// (PTX ISA, "Warp-level matrix load instruction: ldmatrix").
-    fn load_matrices(
-        &self,
-        warp: &mut Warp,
-        memory: Memory,
-        to: &[usize],
-    ) -> Result<(), Unknown> {
+    fn load_matrices(&self, warp: &mut Warp, memory: Memory, to: &[usize]) -> Result<(), Unknown> {
         let addresses = self.value(warp, memory.place);
         for (matrix, &register) in to.iter().enumerate() {
             for lane in 0..WARP {
@@ -358,11 +378,46 @@ impl<'a> Group<'a> {
     }
 }
 
+/// The results of the most frequent instructions, in loops that the compiler can make vectors of;
+/// the same numbers as those of [`compute`].
+fn usual(op: Op, kind: Kind, [a, b, c, _]: &[Lanes; 4]) -> Option<Lanes> {
+    let float = |numbers: &Lanes, lane: usize| f32::from_bits(numbers[lane] as u32);
+    let bits = |number: f32| u64::from(number.to_bits());
+    let word = |number: u64| u64::from(number as u32);
+    Some(match (op, kind) {
+        (Op::Move, _) => *a,
+        (Op::Fused(false), Kind::F32) => {
+            each(|lane| bits(float(a, lane).mul_add(float(b, lane), float(c, lane))))
+        }
+        (Op::Add, Kind::F32) => each(|lane| bits(float(a, lane) + float(b, lane))),
+        (Op::Multiply, Kind::F32) => each(|lane| bits(float(a, lane) * float(b, lane))),
+        (Op::Add, Kind::Unsigned(4) | Kind::Signed(4)) => {
+            each(|lane| word(a[lane].wrapping_add(b[lane])))
+        }
+        (Op::Add, Kind::Unsigned(8) | Kind::Signed(8)) => {
+            each(|lane| a[lane].wrapping_add(b[lane]))
+        }
+        (Op::MultiplyAdd, Kind::Unsigned(4) | Kind::Signed(4)) => {
+            each(|lane| word(a[lane].wrapping_mul(b[lane]).wrapping_add(c[lane])))
+        }
+        (Op::MultiplyWide, Kind::Unsigned(4)) => {
+            each(|lane| word(a[lane]).wrapping_mul(word(b[lane])))
+        }
+        (Op::And, Kind::Unsigned(4 | 8)) => each(|lane| a[lane] & b[lane]),
+        (Op::Or, Kind::Unsigned(4 | 8)) => each(|lane| a[lane] | b[lane]),
+        _ => return None,
+    })
+}
+
+fn each(of: impl Fn(usize) -> u64) -> Lanes {
+    std::array::from_fn(of)
+}
+
 /// `mma.m16n8k16`: D = A B + C (PTX ISA, "Matrix Fragments for mma.m16n8k16 with floating point
 /// type"). `from` has four registers of A, two of B, four of C.
 fn multiply(warp: &mut Warp, to: &[usize], from: &[Lanes]) {
     let mut a = [[0.0_f32; 16]; 16];
-    let mut b = [[0.0_f32; 8]; 16];
+    let mut b = [[0.0_f32; 16]; 8];
     for lane in 0..WARP {
         let (group, within) = (lane / 4, lane % 4);
         for part in 0..8 {
@@ -372,16 +427,16 @@ fn multiply(warp: &mut Warp, to: &[usize], from: &[Lanes]) {
         }
         for part in 0..4 {
             let row = 2 * within + part % 2 + 8 * (part / 2);
-            b[row][group] = f16_at(from[4 + part / 2][lane], part % 2);
+            b[group][row] = f16_at(from[4 + part / 2][lane], part % 2);
         }
     }
     for lane in 0..WARP {
         for (part, &register) in to.iter().enumerate() {
             let (row, column) = (lane / 4 + 8 * (part / 2), 2 * (lane % 4) + part % 2);
             let before = f32::from_bits(from[6 + part][lane] as u32);
-            let products = (0..16).map(|k| f64::from(a[row][k]) * f64::from(b[k][column]));
-            let sum = products.sum::<f64>() + f64::from(before);
-            warp.registers[register][lane] = u64::from((sum as f32).to_bits());
+            // Products of two f16 are exact in f32; the hardware's order of the sums is not known.
+            let sum = a[row].iter().zip(&b[column]).fold(before, |sum, (a, b)| sum + a * b);
+            warp.registers[register][lane] = u64::from(sum.to_bits());
         }
     }
 }

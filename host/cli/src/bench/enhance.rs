@@ -1,8 +1,8 @@
 //! `nirspi bench enhance`: times the learned stages.
 
 use super::RunArgs;
-use crate::networks::say_notes;
 use crate::deblur::in_steps;
+use crate::networks::say_notes;
 use crate::print;
 use anyhow::Result;
 use nirspi_eval::bench::enhance::{Stages, Timed, time};

@@ -158,10 +158,8 @@ pub(super) fn convolve<N: Size>(
     let first_frame = CUBE_POS_X as usize / bands * comptime!(tiles.frames());
     let first_row = CUBE_POS_X as usize % bands * rows;
 
-    let mut seen = SharedMemory::<Vector<f16, N>>::new_aligned(
-        comptime!(planes * staged * of_row),
-        16usize,
-    );
+    let mut seen =
+        SharedMemory::<Vector<f16, N>>::new_aligned(comptime!(planes * staged * of_row), 16usize);
     let mut kernel = SharedMemory::<Vector<f16, N>>::new_aligned(
         comptime!(lines * side_of_kernel * channels * of_row),
         16usize,
@@ -268,8 +266,8 @@ pub(super) fn convolve<N: Size>(
             }
             sync_cube();
             for tap in 0..comptime!(lines * side_of_kernel) {
-                let shift = (turn * lines + tap / side_of_kernel) * staged_columns
-                    + tap % side_of_kernel;
+                let shift =
+                    (turn * lines + tap / side_of_kernel) * staged_columns + tap % side_of_kernel;
                 let tap_rows = tap * channels;
                 if comptime!(product == Product::TensorCores) {
                     multiply::<N>(
@@ -388,8 +386,8 @@ fn multiply<N: Size>(
         #[unroll]
         for i in 0..comptime!(tiles.down) {
             // The first two matrices are the first halves of 16 pixels, then come the second ones.
-            let at = (half_at(pixels[i] + shift, lane / 16) + comptime!(2 * staged) * plane)
-                * of_half;
+            let at =
+                (half_at(pixels[i] + shift, lane / 16) + comptime!(2 * staged) * plane) * of_half;
             let line = products.load_matrix::<Vector<f16, N>, Const<2>>(
                 &seen.slice(at, at + of_half),
                 MatrixIdent::A,
@@ -398,11 +396,7 @@ fn multiply<N: Size>(
             );
             #[unroll]
             for j in 0..across {
-                products.execute_inplace(
-                    &line,
-                    columns.index(j),
-                    sums.index_mut(i * across + j),
-                );
+                products.execute_inplace(&line, columns.index(j), sums.index_mut(i * across + j));
             }
         }
     }
@@ -444,8 +438,7 @@ fn imitate<N: Size>(
                     let mut two = Vector::<f32, Const<2>>::empty();
                     let before = sums.index(i * across + j)[part];
                     for k in 0..2usize {
-                        let channel =
-                            (warp_across * across + j) * CHANNELS + lane % 4 * 2 + k;
+                        let channel = (warp_across * across + j) * CHANNELS + lane % 4 * 2 + k;
                         let weight = half_at(tap_rows + channel, half % 2) * of_half;
                         two[k] = before[k] + eight::<N>(seen, kernel, at, weight);
                     }

@@ -242,7 +242,11 @@ mod tests {
             // Three workgroups fit a multiprocessor of an H100.
             assert!(3 * tiles.shared_bytes() <= 228 << 10, "{}", tiles.shared_bytes());
         }
-        assert_eq!(tiles(48, 32, 1).pixels(), 128, "one frame has too few workgroups of 256 pixels");
+        assert_eq!(
+            tiles(48, 32, 1).pixels(),
+            128,
+            "one frame has too few workgroups of 256 pixels"
+        );
         assert_eq!(Columns::of(12), None);
         assert_eq!(Columns::of(0), None);
     }
@@ -256,7 +260,8 @@ mod tests {
         assert!(of(32, 4, &H100).is_some());
         assert_eq!(of(24, 4, &H100), None, "rows that do not fill a tile");
         assert_eq!(of(512, 4, &H100), None, "a row that is longer than a tile");
-        let with = |shared_bytes| of(32, 4, &DeviceLimits { shared_bytes, ..H100 }).map(|t| t.lines);
+        let with =
+            |shared_bytes| of(32, 4, &DeviceLimits { shared_bytes, ..H100 }).map(|t| t.lines);
         assert_eq!(with(22 << 10), Some(3));
         assert_eq!(with(16 << 10), Some(1), "weights of one line at a time");
         assert_eq!(with(10 << 10), None);

@@ -78,7 +78,6 @@ impl Multiplier {
                     product: self.product,
                     planes,
                     columns,
-                    down: None,
                     weights: engine.narrow(&packed),
                     beyond: self.beyond.clone(),
                 })

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nirspi_gpu::network::plan::frames_at_once;
-use nirspi_gpu::network::{Activation, Add, Degraded, Finish, Layer, Made};
+use nirspi_gpu::network::{Activation, Add, Degraded, Finish, Layer, Made, Way};
 use nirspi_gpu::{Buffer, Kernels};
 
 use super::layer::{self, Maker, checked};
@@ -133,39 +133,31 @@ impl UNet {
         read.try_into().unwrap_or_else(|_| unreachable!("as many as were made"))
     }
 
-    /// The same network after a comparison: random images go through it by the tensor cores and
-    /// without them, one alone and as many as at once. If the outputs differ, or the device cannot
-    /// run the kernels, the tensor cores are given up.
+    /// The same network after a comparison: one image of noise goes through it by the tensor cores,
+    /// in both ways, and without them. If the outputs differ, or the device cannot run the kernels,
+    /// the tensor cores are given up.
     pub(crate) fn compared(self) -> Self {
         let Some(multiplier) = &self.multiplier else { return self };
         let on = self.engine.as_ref();
-        let side = SIDE;
-        for frames in [1, self.at_once(side)] {
-            let area = side * side;
-            let images = |seed: u64| -> Vec<f32> {
-                let mut noise = Noise::of(seed, 0);
-                let pixel = || (0.5 + 0.2 * noise.draw()).clamp(0.0, 1.0);
-                std::iter::repeat_with(pixel).take(frames * area).collect()
-            };
-            let [current, degraded] = [1, 2].map(|seed| on.upload(&images(seed)));
-            let told = on.upload(&[1.0, 1.0, 0.5, 0.25, 0.1, 0.01].repeat(frames));
-            let run = || {
-                let seen = Degraded::Fine(&degraded);
-                self.forward((frames, side), &current, seen, &told, None)
-            };
-            let fast = run();
+        let image = |seed: u64| -> Vec<f32> {
+            let mut noise = Noise::of(seed, 0);
+            let pixel = || (0.5 + 0.2 * noise.draw()).clamp(0.0, 1.0);
+            std::iter::repeat_with(pixel).take(SIDE * SIDE).collect()
+        };
+        let [current, degraded] = [1, 2].map(|seed| on.upload(&image(seed)));
+        let told = on.upload(&[1.0, 1.0, 0.5, 0.25, 0.1, 0.01]);
+        let images = (&current, Degraded::Fine(&degraded));
+        let outputs = [Way::Plain, Way::Products(2), Way::Products(4)]
+            .map(|way| self.forward_by(way, (1, SIDE), images, &told, None));
+        let agree = on.read(&outputs.each_ref()).is_ok_and(|read| {
+            let mut pairs =
+                read[1..].iter().flat_map(|fast| fast.floats().iter().zip(read[0].floats()));
+            // NaN is not within the bound.
+            pairs.all(|(fast, plain)| (fast - plain).abs() <= multiplier.bound())
+        });
+        if !agree {
+            multiplier.note(Note::TensorCoresDiffer);
             self.plain.store(true, Ordering::Relaxed);
-            let read = on.read(&[&fast, &run()]);
-            let agree = read.is_ok_and(|read| {
-                let pairs = read[0].floats().iter().zip(read[1].floats());
-                // NaN is not within the bound.
-                pairs.fold(true, |all, (a, b)| all && (a - b).abs() <= multiplier.bound())
-            });
-            if !agree {
-                multiplier.note(Note::TensorCoresDiffer);
-                return self;
-            }
-            self.plain.store(false, Ordering::Relaxed);
         }
         self
     }
@@ -180,14 +172,27 @@ impl UNet {
     /// 6) and degraded images; `start` is added, if there is one.
     pub(super) fn forward(
         &self,
-        (frames, side): (usize, usize),
+        size: (usize, usize),
         current: &Buffer,
         degraded: Degraded<'_>,
         conditions: &Buffer,
         start: Option<&Buffer>,
     ) -> Buffer {
+        let way = if self.is_plain() { Way::Plain } else { Way::Best };
+        self.forward_by(way, size, (current, degraded), conditions, start)
+    }
+
+    /// [`forward`](Self::forward) by these kernels.
+    fn forward_by(
+        &self,
+        way: Way,
+        (frames, side): (usize, usize),
+        (current, degraded): (&Buffer, Degraded<'_>),
+        conditions: &Buffer,
+        start: Option<&Buffer>,
+    ) -> Buffer {
         let on = self.engine.as_ref();
-        let usual = Finish { plain: self.is_plain(), ..Finish::default() };
+        let usual = Finish { way, ..Finish::default() };
         let silu = Finish { activation: Activation::Silu, ..usual };
         let [embed1, embed2] = &self.embed;
         let embedding = on.convolve(embed1, conditions, frames, 1, silu).out;
@@ -289,8 +294,8 @@ impl RunUNet for UNet {
         let parts = images.zip(conditions.chunks(frames));
         let parts = parts.flat_map(|((current, degraded), conditions)| {
             debug_assert_eq!(conditions.as_flattened().len(), CONDITIONS * conditions.len());
-            let [current, degraded, told] = [current, degraded, conditions.as_flattened()]
-                .map(|numbers| on.upload(numbers));
+            let [current, degraded, told] =
+                [current, degraded, conditions.as_flattened()].map(|numbers| on.upload(numbers));
             let size = (conditions.len(), side);
             let seen = Degraded::Fine(&degraded);
             self.read_after(|| [self.forward(size, &current, seen, &told, None)])[0].clone()

@@ -303,7 +303,8 @@ impl Reader {
                 let (place, distance) = self.address(parts.first().ok_or_else(unknown)?)?;
                 let memory = Memory { space: space().ok_or_else(unknown)?, place, distance };
                 let from = elements(parts.get(1).ok_or_else(unknown)?);
-                let from = from.into_iter().map(|text| self.place(text)).collect::<Result<_, _>>()?;
+                let from =
+                    from.into_iter().map(|text| self.place(text)).collect::<Result<_, _>>()?;
                 return Ok(done(Op::Store(memory), kind, vec![], from));
             }
             "ldmatrix" if has("m8n8") && !has("trans") => {

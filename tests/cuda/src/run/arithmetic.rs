@@ -130,7 +130,13 @@ fn integer(op: Op, bytes: usize, sign: bool, [a, b, c, d]: [u64; 4]) -> u64 {
         Op::Or => a | b,
         Op::Xor => a ^ b,
         Op::Not => !a,
-        Op::Left => if shift < u64::from(bits) { a << shift } else { 0 },
+        Op::Left => {
+            if shift < u64::from(bits) {
+                a << shift
+            } else {
+                0
+            }
+        }
         Op::Right => (wide(a) >> shift.min(127)) as u64,
         Op::Funnel => {
             let pair = low(b, 4) << 32 | low(a, 4);

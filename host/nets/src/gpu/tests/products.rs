@@ -3,21 +3,20 @@
 //! same tests use these.
 
 use nirspi_gpu::network::tiles::Columns;
-use nirspi_gpu::network::{Layer, Product, Products, is_f16};
+use nirspi_gpu::network::{Layer, Product, Products, Way, is_f16};
 
 use super::*;
 use crate::device::{Arithmetic, Note, Notes};
 use crate::gpu::multiplier::Multiplier;
 use crate::gpu::{UNet, pack};
 
-/// The products that a device can compute.
-fn products_of(engine: &dyn Kernels) -> Vec<Product> {
-    let products = [Product::TensorCores, Product::Imitated];
-    let there: Vec<Product> = products.into_iter().filter(|&p| engine.has(p)).collect();
-    if there.is_empty() {
+/// The tensor cores of a device, or else their imitation.
+fn product_of(engine: &dyn Kernels) -> Option<Product> {
+    let product = [Product::TensorCores, Product::Imitated].into_iter().find(|&p| engine.has(p));
+    if product.is_none() {
         eprintln!("skipped: this device has no f16");
     }
-    there
+    product
 }
 
 /// The nearest number of f16, by its definition: 11 bits, and none finer than 2^-24.
@@ -39,12 +38,12 @@ fn layer_of(
     filter: &Filter,
     reach: (usize, usize),
     order: Order,
-    (product, planes, down): (Product, usize, Option<usize>),
+    (product, planes): (Product, usize),
 ) -> (Layer, Buffer) {
     let columns = Columns::of(filter.outputs).unwrap();
     let beyond = on.upload(&[0.0]);
     let weights = on.narrow(&pack::products(filter, columns, order));
-    let products = Products { product, planes, columns, down, weights, beyond: beyond.clone() };
+    let products = Products { product, planes, columns, weights, beyond: beyond.clone() };
     (layer::layer(on, filter, reach, None, order).with_products(products), beyond)
 }
 
@@ -77,16 +76,18 @@ fn every_layer_by_products_is_its_definition() {
             let narrow: Vec<f32> = images.iter().map(|&v| nearest_f16(v)).collect();
             let expected = [of(&narrow), of(&images)];
             let input = on.upload(&images);
-            for product in products_of(on) {
+            if let Some(product) = product_of(on) {
                 // Both numbers of products below each other, for the sizes that have both.
-                let many = (side > 8 && inputs == outputs).then_some((2, Some(4)));
-                for (planes, down) in [(1, Some(2)), (2, None)].into_iter().chain(many) {
-                    let how = (product, planes, down);
+                let many = (side > 8 && inputs == outputs).then_some((2, Way::Products(4)));
+                for (planes, way) in [(1, Way::Products(2)), (2, Way::Best)].into_iter().chain(many)
+                {
+                    let how = (product, planes);
                     let (layer, beyond) =
                         layer_of(on, &filter, (stride, centre), Order::AsStored, how);
-                    let made = on.convolve(&layer, &input, frames, side, Finish::default());
+                    let finish = Finish { way, ..Finish::default() };
+                    let made = on.convolve(&layer, &input, frames, side, finish);
                     let what = format!(
-                        "{backend}: {inputs} to {outputs}, {kernel} x {kernel}, {how:?}"
+                        "{backend}: {inputs} to {outputs}, {kernel} x {kernel}, {how:?}, {way:?}"
                     );
                     assert_close(&read(on, &made.out), &expected[planes - 1], &what);
                     assert_eq!(read(on, &beyond), [0.0], "{what}");
@@ -122,12 +123,12 @@ fn what_follows_a_product_is_done_to_its_own_pixel_and_channel() {
             },
         ];
         for (product, finish) in
-            products_of(on).into_iter().flat_map(|p| finishes.iter().map(move |f| (p, f)))
+            product_of(on).into_iter().flat_map(|p| finishes.iter().map(move |f| (p, f)))
         {
             let order = if finish.shuffle { Order::Shuffled } else { Order::AsStored };
-            let (layer, _) = layer_of(on, &filter, (1, 1), order, (product, 2, None));
+            let (layer, _) = layer_of(on, &filter, (1, 1), order, (product, 2));
             let fast = on.convolve(&layer, &input, frames, side, *finish);
-            let plain = Finish { plain: true, ..*finish };
+            let plain = Finish { way: Way::Plain, ..*finish };
             let plain = on.convolve(&layer, &input, frames, side, plain);
             let what = format!("{backend}: {product:?}, {:?}", finish.activation);
             assert_close(&read(on, &fast.out), &read(on, &plain.out), &what);
@@ -153,13 +154,8 @@ fn numbers_are_rounded_as_f16_rounds_them() {
 /// A kernel that copies channel 0, so that each number can be seen as it was multiplied.
 #[test]
 fn an_activation_is_a_number_of_f16_or_the_sum_of_two() {
-    let mut filter = Filter {
-        inputs: 8,
-        outputs: 16,
-        side: 1,
-        weights: vec![0.0; 8 * 16],
-        bias: vec![0.0; 16],
-    };
+    let mut filter =
+        Filter { inputs: 8, outputs: 16, side: 1, weights: vec![0.0; 8 * 16], bias: vec![0.0; 16] };
     filter.weights[0] = 1.0;
     let tricky = [1.0, 1.0 / 3.0, 2049.0, 2051.0, -4097.5, 1e-6, 6.0e-5, 5.97e-8, 2e-8, 60_001.0];
     let mut images = vec![0.0; 16 * 8];
@@ -168,9 +164,9 @@ fn an_activation_is_a_number_of_f16_or_the_sum_of_two() {
     }
     for (backend, engine) in engines() {
         let on = engine.as_ref();
-        for product in products_of(on) {
+        if let Some(product) = product_of(on) {
             let seen = |planes| -> Vec<f32> {
-                let how = (product, planes, None);
+                let how = (product, planes);
                 let (layer, _) = layer_of(on, &filter, (1, 0), Order::AsStored, how);
                 let made = on.convolve(&layer, &on.upload(&images), 1, 4, Finish::default());
                 read(on, &made.out).chunks_exact(16).map(|pixel| pixel[0]).collect()
@@ -201,7 +197,8 @@ fn scene() -> [Vec<f32>; 2] {
     let soft = |i: usize| {
         let (x, y) = (i % 64, i / 64);
         let near = |v: usize| v.saturating_sub(2)..(v + 3).min(64);
-        let sum: f32 = near(y).flat_map(|y| near(x).map(move |x| (x, y))).map(|(x, y)| at(x, y)).sum();
+        let sum: f32 =
+            near(y).flat_map(|y| near(x).map(move |x| (x, y))).map(|(x, y)| at(x, y)).sum();
         sum / 25.0
     };
     [sharp, (0..64 * 64).map(soft).collect()]
@@ -214,13 +211,14 @@ fn the_unet_by_products_is_the_unet_in_both_precisions() {
     let theirs = cpu::UNet::new(&Weights::embedded("diffusion").unwrap()).unwrap();
     let theirs = theirs.forward(&sharp, &soft, (64, 64), &told);
     for (backend, engine) in engines() {
-        for product in products_of(engine.as_ref()) {
+        if let Some(product) = product_of(engine.as_ref()) {
             for (arithmetic, largest, rms) in
                 [(Arithmetic::F32, 1e-4, 1e-5), (Arithmetic::F16, 5e-3, 2e-4)]
             {
                 let (unet, notes) = unet(&engine, Some((product, arithmetic)));
                 let ours = unet.run(64, &sharp, &soft, &[told]);
-                let apart: Vec<f32> = ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs()).collect();
+                let apart: Vec<f32> =
+                    ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs()).collect();
                 let most = apart.iter().copied().fold(0.0, f32::max);
                 let mean = apart.iter().map(|v| v * v).sum::<f32>() / apart.len() as f32;
                 eprintln!(
@@ -228,7 +226,9 @@ fn the_unet_by_products_is_the_unet_in_both_precisions() {
                     mean.sqrt()
                 );
                 // NaN fails these comparisons too.
-                assert!(apart.iter().all(|v| v.is_finite()) && most <= largest && mean.sqrt() <= rms);
+                assert!(
+                    apart.iter().all(|v| v.is_finite()) && most <= largest && mean.sqrt() <= rms
+                );
                 assert_eq!(notes.take(), []);
             }
         }
@@ -243,7 +243,7 @@ fn a_number_beyond_f16_is_computed_without_tensor_cores_and_the_user_is_told() {
     for (backend, engine) in engines() {
         let (plain, _) = unet(&engine, None);
         let expected = plain.run(64, &bright, &bright, &[told]);
-        let Some(product) = products_of(engine.as_ref()).pop() else { continue };
+        let Some(product) = product_of(engine.as_ref()) else { continue };
         let (unet, notes) = unet(&engine, Some((product, Arithmetic::F32)));
         for _ in 0..2 {
             assert_eq!(unet.run(64, &bright, &bright, &[told]), expected, "{backend}");
