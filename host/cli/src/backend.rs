@@ -26,12 +26,23 @@ pub enum Device {}
 #[cfg(feature = "gpu")]
 pub fn choose(backend: Backend, frames: usize) -> Result<Option<Device>> {
     match gpu::choose(backend, frames)? {
-        Choice::Gpu(device) => Ok(Some(device)),
+        Choice::Gpu(device) => {
+            say_slow_start();
+            Ok(Some(device))
+        }
         Choice::Cpu(None) => Ok(None),
         Choice::Cpu(Some(absent)) => {
             print::complain(format_args!("{absent}; using the CPU"));
             Ok(None)
         }
+    }
+}
+
+/// Says once on stderr why each run compiles the GPU's kernels, if it does.
+pub fn say_slow_start() {
+    #[cfg(feature = "gpu")]
+    if let Some(why) = nirspi_recon::backend::probe::kernel_cache_trouble() {
+        print::remark(why);
     }
 }
 

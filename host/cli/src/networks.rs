@@ -55,6 +55,7 @@ impl NetworkArgs {
     /// Opens the device and reads the user's weights, which must belong to one of these networks.
     pub fn open(&self, models: &[&str]) -> Result<Networks> {
         let device = Device::open(self.backend)?.with_arithmetic(self.precision);
+        crate::backend::say_slow_start();
         let mut networks = Networks::built_in(device);
         for file in &self.weights {
             networks = networks.with_file(file, models).map_err(of_argument)?;

@@ -5,6 +5,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`probe`] | finds GPUs |
+//! | [`cache`] | keeps compiled CUDA kernels between runs |
 //! | `engine` | [`Buffer`]s, [`open`], and what any engine does: upload, read, say its limits |
 //! | [`limits`] | the limits of a device |
 //! | [`pursuit`] | orthogonal matching pursuit of many frames, for `nirspi-recon` |
@@ -20,6 +21,7 @@
 //! buffers first, and panics if the caller gave other lengths than it promises. No test gives wrong
 //! lengths; the tests of OMP and of the networks on a GPU (`.ci/run gpu`) run every kernel.
 
+pub mod cache;
 mod engine;
 pub mod limits;
 pub mod network;

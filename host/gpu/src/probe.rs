@@ -3,6 +3,7 @@
 //! A missing library is an error and never a panic: [`cuda`] looks for CUDA's libraries before
 //! CubeCL, which would panic without them.
 
+use crate::cache::{self, Compiled};
 #[cfg(feature = "source")]
 use crate::source::Card;
 use cubecl::cuda::{CudaDevice, install::cuda_path};
@@ -103,7 +104,8 @@ impl Gpu {
     }
 }
 
-/// The first GPU that CUDA can use.
+/// The first GPU that CUDA can use. The first call has CubeCL keep compiled kernels
+/// ([`cache`](crate::cache)).
 ///
 /// # Errors
 /// [`Absent`] if the driver, the run-time compiler, its headers, or a GPU is missing.
@@ -113,8 +115,20 @@ pub fn cuda() -> Result<Found<CudaDevice>, Absent> {
     if CudaContext::device_count().map_err(refused)? < 1 {
         return Err(Absent::Device);
     }
-    let name = CudaContext::new(0).and_then(|context| context.name()).map_err(refused)?;
+    let context = CudaContext::new(0).map_err(refused)?;
+    let name = context.name().map_err(refused)?;
+    let capability = context.compute_capability().map_err(refused)?;
+    cache::enable(Compiled { capability, compiler: compiler() });
     Ok(Found { device: CudaDevice::new(0), name, software: false })
+}
+
+/// NVRTC's version, (0, 0) if it does not say.
+#[expect(unsafe_code, reason = "a function of NVIDIA's library")]
+fn compiler() -> (i32, i32) {
+    let (mut major, mut minor) = (0, 0);
+    // SAFETY: the library is there, and writes two numbers.
+    let _ = unsafe { cudarc::nvrtc::sys::nvrtcVersion(&raw mut major, &raw mut minor) };
+    (major, minor)
 }
 
 /// Checks for the libraries that CubeCL needs.

@@ -8,6 +8,7 @@
 
 use super::Backend;
 use nirspi_gpu::Gpu;
+pub use nirspi_gpu::cache::trouble as kernel_cache_trouble;
 use nirspi_gpu::probe::{Absent, Adapters, adapter, cuda};
 use thiserror::Error;
 
