@@ -1,6 +1,7 @@
 //! Buffers on a device, and what every engine does with them.
 
 use crate::Gpu;
+use crate::agreement::Agree;
 use crate::limits::DeviceLimits;
 use crate::network::Convolve;
 use crate::pursuit::Pursue;
@@ -104,9 +105,9 @@ pub trait Engine: Send + Sync {
 }
 
 /// Every kernel of this crate.
-pub trait Kernels: Pursue + Convolve {}
+pub trait Kernels: Pursue + Convolve + Agree {}
 
-impl<E: Pursue + Convolve> Kernels for E {}
+impl<E: Pursue + Convolve + Agree> Kernels for E {}
 
 /// The engine of a device. CubeCL has one client for each device, so buffers of one engine can be
 /// used with every other engine of the same device.

@@ -10,17 +10,19 @@
 //! | [`limits`] | the limits of a device |
 //! | [`pursuit`] | orthogonal matching pursuit of many frames, for `nirspi-recon` |
 //! | [`network`] | convolutional networks, for `nirspi-nets` |
+//! | [`agreement`] | agreement of images with their readings, for `nirspi-nets` |
 //! | `source` | with the feature `source`: the CUDA source of every kernel, without a GPU |
 //!
 //! This crate alone uses CubeCL, for two reasons. Generic code of CubeCL's runtimes is compiled
 //! once, where each crate that launches a kernel would compile its own copy. And all launches, with
-//! their `unsafe` code, are in two files.
+//! their `unsafe` code, are in three files.
 //!
 //! # Invariant
 //! A kernel does not check its indices. Each function that launches one checks the lengths of the
 //! buffers first, and panics if the caller gave other lengths than it promises. No test gives wrong
 //! lengths; the tests of OMP and of the networks on a GPU (`.ci/run gpu`) run every kernel.
 
+pub mod agreement;
 pub mod cache;
 mod engine;
 pub mod limits;

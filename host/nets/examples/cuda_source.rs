@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Both ends of a pipeline: images of OMP in the pixels' basis and in another, and paths.
 fn pursue(card: Card) -> Result<(), Box<dyn Error>> {
-    let device = gpu::Device::source(card);
+    let device = gpu::Device::of(&card.into());
     for (measurements, sparsity) in [(AREA, 64), (AREA / 2, 64)] {
         let matrix = DMatrix::from_fn(measurements, AREA, |row, column| {
             1.0 - 2.0 * f64::from((row & column).count_ones() % 2)
@@ -86,7 +86,7 @@ fn enhance(card: Card, arithmetic: Arithmetic) -> Result<(), Box<dyn Error>> {
     let there = DeviceEnhancer::new(&device, &fsrcnn?, &estimator?, &bridge?)?;
     let half: Vec<u32> = (0..AREA as u32 / 2).collect();
     for frames in FRAMES {
-        let omp = gpu::Device::source(card);
+        let omp = gpu::Device::of(&card.into());
         let images = DeviceImages::upload(&omp, &vec![0.5; frames * AREA], AREA)?;
         let depth = DepthMaps::new(vec![0.5; 64], [1, 8, 8], frames)?;
         for measured in [MeasuredRows::All, MeasuredRows::new(fusion::SIDE, &half)?] {

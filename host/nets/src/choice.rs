@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::deblur::{Deblurrer, Method};
+#[cfg(feature = "gpu")]
+use crate::device::Backend;
 use crate::device::Device;
 #[cfg(feature = "gpu")]
 use crate::enhance::{DeviceEnhancer, DeviceEnhancerError};
@@ -134,7 +136,16 @@ impl Networks {
     /// # Errors
     /// As [`weights`](Self::weights).
     pub fn enhancer(&mut self, method: Method) -> Result<Enhancer, WeightsError> {
-        Ok(Enhancer::new(self.fusion()?, self.sharpener(method)?))
+        let enhancer = Enhancer::new(self.fusion()?, self.sharpener(method)?);
+        #[cfg(feature = "gpu")]
+        if method == Method::default() && self.device.backend() != Backend::Cpu {
+            match self.device_enhancer() {
+                Ok(on_device) => return Ok(enhancer.with_device(on_device)),
+                Err(DeviceEnhancerError::Weights(error)) => return Err(error),
+                Err(_) => {}
+            }
+        }
+        Ok(enhancer)
     }
 
     /// All three networks, with one step of the bridge, for images that OMP leaves on a GPU.

@@ -17,9 +17,13 @@
 //! rows are missing, only the measured part counts, and [`MeasuredRows`] solves the same equation
 //! in a Krylov space.
 
+#[cfg(feature = "gpu")]
+mod device;
 mod krylov;
 mod measured;
 
+#[cfg(feature = "gpu")]
+pub(crate) use device::agreement;
 pub use measured::{MeasuredRows, MeasuredRowsError, SampledRows};
 
 use crate::cosine::Cosine;
@@ -44,6 +48,9 @@ const NOISE_FLOOR: f32 = 0.004;
 /// lambda) = 5 times the residual. The readings then still disagree, and the inconsistency shows
 /// that.
 const LEAST_LAMBDA: f32 = 0.01;
+
+/// Largest lambda, as a decimal logarithm.
+const MOST_LOG_LAMBDA: f32 = 4.0;
 
 /// Number of halvings of the interval of lambda's logarithm, which gives lambda to 1e-5.
 const BISECTIONS: usize = 22;
@@ -200,7 +207,7 @@ impl Consistency {
 /// The largest lambda, from [`LEAST_LAMBDA`] up on a logarithmic scale, whose result is not
 /// `outside` the ball.
 fn bisect(halvings: usize, mut outside: impl FnMut(f32) -> bool) -> f32 {
-    let (mut inside, mut beyond) = (LEAST_LAMBDA.log10(), 4.0_f32);
+    let (mut inside, mut beyond) = (LEAST_LAMBDA.log10(), MOST_LOG_LAMBDA);
     for _ in 0..halvings {
         let middle = 0.5 * (inside + beyond);
         if outside(10.0_f32.powf(middle)) {

@@ -28,6 +28,12 @@ impl<T: RealField + Copy> Cosine<T> {
         &self.down.matrix[k * self.down.length..][..self.down.length]
     }
 
+    /// All waves down the image, row after row.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn waves(&self) -> &[T] {
+        &self.down.matrix
+    }
+
     /// C X C^T: the coefficient in row k and column l belongs to wave k down the image times wave l
     /// across it.
     pub(crate) fn forward(&self, image: &[T]) -> Vec<T> {

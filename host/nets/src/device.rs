@@ -109,6 +109,12 @@ impl Device {
         self.notes.take()
     }
 
+    /// The notes, for a network on this device to add to.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn shared_notes(&self) -> Notes {
+        self.notes.clone()
+    }
+
     #[cfg(not(feature = "gpu"))]
     fn has_tensor_cores(&self) -> bool {
         false
@@ -168,6 +174,15 @@ impl Device {
         match &self.kind {
             Kind::Cpu => None,
             Kind::Gpu(gpu) => Some(nirspi_gpu::open(gpu)),
+        }
+    }
+
+    /// The same device, for images that come from OMP or from the host; `None` for the processor.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn uploads(&self) -> Option<nirspi_recon::omp::gpu::Device> {
+        match &self.kind {
+            Kind::Cpu => None,
+            Kind::Gpu(gpu) => Some(nirspi_recon::omp::gpu::Device::of(gpu)),
         }
     }
 

@@ -66,6 +66,9 @@ pub enum EnhanceError {
     /// The output of a sharpening network was refused.
     #[error(transparent)]
     Sharpen(#[from] SharpenError),
+    /// A GPU, or its driver, failed.
+    #[error("{0}")]
+    Device(String),
 }
 
 /// Enhanced images, and numbers about them.
@@ -156,29 +159,50 @@ impl Sharpener {
 }
 
 /// Both stages: input 32 x 32, output 64 x 64.
+///
+/// On a GPU, with one step of the bridge and no copies for the spread, images stay on the GPU from
+/// the readings to the results ([`DeviceEnhancer`]); otherwise each network's output comes to the
+/// host.
 pub struct Enhancer {
     fusion: Fusion,
     sharpener: Sharpener,
+    #[cfg(feature = "gpu")]
+    on_device: Option<DeviceEnhancer>,
 }
 
 impl Enhancer {
     /// An enhancer made of its three networks.
     pub fn new(fusion: Fusion, sharpener: Sharpener) -> Self {
-        Self { fusion, sharpener }
+        Self {
+            fusion,
+            sharpener,
+            #[cfg(feature = "gpu")]
+            on_device: None,
+        }
+    }
+
+    /// The same enhancer, with images that stay on a GPU where that is possible.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn with_device(self, on_device: DeviceEnhancer) -> Self {
+        Self { on_device: Some(on_device), ..self }
     }
 
     /// The same enhancer with your own sharpening network, with this number of steps on the bridge.
     #[must_use]
     pub fn with_network(mut self, network: Box<dyn Sharpen>, steps: NonZeroU32) -> Self {
         self.sharpener.deblurrer = Deblurrer::own(network, steps);
+        #[cfg(feature = "gpu")]
+        {
+            self.on_device = None;
+        }
         self
     }
 
     /// Enhances a stack with its depth maps; `progress` gets the number of finished images.
     ///
     /// # Errors
-    /// [`EnhanceError`] if the measured rows are not of 32 x 32 readings, or the output of your own
-    /// network is refused.
+    /// [`EnhanceError`] if the measured rows are not of 32 x 32 readings, the output of your own
+    /// network is refused, or a GPU fails.
     pub fn enhance(
         &self,
         images: Images<'_, { crate::fusion::SIDE }>,
@@ -187,6 +211,12 @@ impl Enhancer {
         progress: &mut dyn FnMut(usize),
     ) -> Result<Enhanced, EnhanceError> {
         const SIDE: usize = crate::fusion::SIDE;
+        #[cfg(feature = "gpu")]
+        if let Some(on_device) = self.on_device.as_ref().filter(|_| options.copies == 0) {
+            return on_device
+                .enhance_values(images.values(), depth, options, progress)
+                .map_err(|error| EnhanceError::Device(error.to_string()));
+        }
         let Sharpener { estimator, deblurrer } = &self.sharpener;
         in_batches(images, deblurrer.batch(), progress, |first, batch| {
             let depth = depth.map(|depth| depth.of(first, batch.count()));

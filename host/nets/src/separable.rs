@@ -20,6 +20,12 @@ impl Separable {
         Self { rows, columns, matrix, transposed }
     }
 
+    /// M, row after row.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn matrix(&self) -> &[f32] {
+        &self.matrix
+    }
+
     /// M X M^T.
     pub(crate) fn forward(&self, image: &[f32]) -> Vec<f32> {
         product(&product(&self.matrix, image, self.columns), &self.transposed, self.columns)

@@ -202,7 +202,8 @@ impl Reader {
             ".z" => Some(2),
             _ => None,
         };
-        let special: [(&str, fn(usize) -> Place); 4] = [
+        type Special = (&'static str, fn(usize) -> Place);
+        let special: [Special; 4] = [
             ("%tid", Place::Unit),
             ("%ntid", Place::Units),
             ("%ctaid", Place::Group),

@@ -9,8 +9,8 @@ mod arithmetic;
 
 use crate::ptx::{Instruction, Kernel, Kind, Memory, Op, Place, Space, Unknown};
 use arithmetic::{compute, f16_at};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 /// Number of units of a warp.
@@ -54,14 +54,14 @@ pub fn launch(work: &Launch<'_>) -> Result<(), Unknown> {
                     }
                     if let Err(error) = Group::new(work, number).run() {
                         next.store(count, Ordering::Relaxed);
-                        *failed.lock().unwrap_or_else(|lock| lock.into_inner()) = Some(error);
+                        *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                         return;
                     }
                 }
             });
         }
     });
-    match failed.into_inner().unwrap_or_else(|lock| lock.into_inner()) {
+    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
         Some(error) => Err(error),
         None => Ok(()),
     }
@@ -367,7 +367,7 @@ impl<'a> Group<'a> {
         for (matrix, &register) in to.iter().enumerate() {
             for lane in 0..WARP {
                 let row = addresses[8 * matrix + lane / 4].wrapping_add(memory.distance);
-                if row % 16 != 0 {
+                if !row.is_multiple_of(16) {
                     return Err(Unknown(format!("a row of a matrix at {row}, no multiple of 16")));
                 }
                 let at = row + 4 * (lane % 4) as u64;
@@ -418,22 +418,25 @@ fn each(of: impl Fn(usize) -> u64) -> Lanes {
 fn multiply(warp: &mut Warp, to: &[usize], from: &[Lanes]) {
     let mut a = [[0.0_f32; 16]; 16];
     let mut b = [[0.0_f32; 16]; 8];
+    let registers = |lane: usize| from.iter().map(move |numbers| numbers[lane]);
     for lane in 0..WARP {
+        let from: Vec<u64> = registers(lane).collect();
         let (group, within) = (lane / 4, lane % 4);
         for part in 0..8 {
             let row = group + 8 * (part / 2 % 2);
             let column = 2 * within + part % 2 + 8 * (part / 4);
-            a[row][column] = f16_at(from[part / 2][lane], part % 2);
+            a[row][column] = f16_at(from[part / 2], part % 2);
         }
         for part in 0..4 {
             let row = 2 * within + part % 2 + 8 * (part / 2);
-            b[group][row] = f16_at(from[4 + part / 2][lane], part % 2);
+            b[group][row] = f16_at(from[4 + part / 2], part % 2);
         }
     }
     for lane in 0..WARP {
+        let from: Vec<u64> = registers(lane).collect();
         for (part, &register) in to.iter().enumerate() {
             let (row, column) = (lane / 4 + 8 * (part / 2), 2 * (lane % 4) + part % 2);
-            let before = f32::from_bits(from[6 + part][lane] as u32);
+            let before = f32::from_bits(from[6 + part] as u32);
             // Products of two f16 are exact in f32; the hardware's order of the sums is not known.
             let sum = a[row].iter().zip(&b[column]).fold(before, |sum, (a, b)| sum + a * b);
             warp.registers[register][lane] = u64::from(sum.to_bits());

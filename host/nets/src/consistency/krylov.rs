@@ -15,14 +15,14 @@ use super::{norm, sum};
 
 /// Largest number of products with the matrix. The equation is well conditioned for the lambdas
 /// that matter.
-const MOST_STEPS: usize = 60;
+pub(super) const MOST_STEPS: usize = 60;
 
 /// Number of steps between two checks of the error.
-const STEPS_A_LOOK: usize = 2;
+pub(super) const STEPS_A_LOOK: usize = 2;
 
 /// Norm of the residual, relative to the right-hand side's norm, at which a solution is accurate
 /// enough.
-const TOLERANCE: f64 = 1e-3;
+pub(super) const TOLERANCE: f64 = 1e-3;
 
 /// The Krylov space of a symmetric, positive semidefinite matrix and a right-hand side.
 pub(super) struct Krylov {

@@ -103,6 +103,12 @@ impl SampledRows {
         self.count
     }
 
+    /// Whether each row was measured.
+    #[cfg(feature = "gpu")]
+    pub(super) fn measured(&self) -> &[bool] {
+        &self.measured
+    }
+
     /// The measured part of readings; both are given by their cosine transform.
     pub(super) fn measured_part(&self, spectrum: &[f32]) -> Vec<f32> {
         let walsh = if self.side == SIDE { &*OF_IMAGE } else { &*OF_READINGS };
@@ -118,6 +124,12 @@ impl SampledRows {
 /// order, for readings of either side.
 static OF_IMAGE: LazyLock<Separable> = LazyLock::new(|| walsh_of_cosines(SIDE));
 static OF_READINGS: LazyLock<Separable> = LazyLock::new(|| walsh_of_cosines(SIDE / 2));
+
+/// The matrix of [`OF_READINGS`], row after row.
+#[cfg(feature = "gpu")]
+pub(super) fn walsh_of_readings() -> &'static [f32] {
+    OF_READINGS.matrix()
+}
 
 fn walsh_of_cosines(side: usize) -> Separable {
     let cosine = Cosine::<f64>::new(side, side);

@@ -59,6 +59,11 @@ pub enum Note {
     WeightsBeyondF16,
     /// An activation was too large for half precision.
     BeyondF16,
+    /// The kernel of the agreement with the readings needs more than the device has.
+    AgreementOnCpu {
+        /// What it needs, and what the device has.
+        why: String,
+    },
     /// The tensor cores did not give what the plain kernels give, or could not be used.
     TensorCoresDiffer,
 }
@@ -78,6 +83,9 @@ impl fmt::Display for Note {
             Self::BeyondF16 => f.write_str(
                 "a number in the network was too large for f16; the images were made again without tensor cores",
             ),
+            Self::AgreementOnCpu { why } => {
+                write!(f, "{why}; the CPU computes the agreement with the readings")
+            }
             Self::TensorCoresDiffer => f.write_str(
                 "the tensor cores failed a comparison with the plain kernels; networks run without them",
             ),

@@ -5,7 +5,12 @@
 //! rounding of single precision
 //! (`tests::images_that_are_there_become_what_the_processor_makes_of_them`).
 
-use nirspi_recon::omp::gpu::DeviceImages;
+use std::ops::Range;
+
+use nirspi_gpu::GpuError;
+use nirspi_recon::omp::OmpError;
+use nirspi_recon::omp::gpu::{self, DeviceImages};
+use rayon::prelude::*;
 use thiserror::Error;
 
 use super::{Enhanced, Options, constraint_on};
@@ -14,6 +19,13 @@ use crate::device::{Backend, Device};
 use crate::fusion::{self, DepthMaps, push_planes};
 use crate::network::{Guess, RunChain};
 use crate::weights::{Weights, WeightsError};
+
+/// Number of batches that are under way at a time, each on a thread and a stream of its own: while
+/// the results of one are copied, another one is computed.
+const AT_A_TIME: usize = 2;
+
+/// Number of images that are uploaded at a time, 32 MB: less than the largest buffer of every device.
+const UPLOADED: usize = 8192;
 
 /// Why images on a device cannot be enhanced there.
 #[derive(Debug, Error)]
@@ -48,6 +60,12 @@ pub enum DeviceEnhancerError {
     /// The measured rows do not belong to these readings.
     #[error(transparent)]
     Rows(#[from] MeasuredRowsError),
+    /// The images could not be uploaded.
+    #[error(transparent)]
+    Upload(#[from] OmpError),
+    /// The GPU or its driver failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// The weights belong to another network.
     #[error(transparent)]
     Weights(#[from] WeightsError),
@@ -55,11 +73,14 @@ pub enum DeviceEnhancerError {
 
 /// Both stages for images on a GPU, input 32 x 32 and output 64 x 64, with one step of the bridge.
 ///
-/// Images, FSRCNN's output and the UNet's input stay on the GPU. The last step, agreement with the
-/// readings, runs on the host.
+/// Nothing comes to the host between the images and the results. Where a device has too little
+/// memory for the kernel of the last step, agreement with the readings, that step runs on the host
+/// ([`Note::AgreementOnCpu`](crate::Note)).
 pub struct DeviceEnhancer {
     chain: Box<dyn RunChain>,
     backend: Backend,
+    /// The same device, for uploads.
+    uploads: gpu::Device,
     batch: usize,
 }
 
@@ -76,7 +97,30 @@ impl DeviceEnhancer {
         bridge: &Weights,
     ) -> Result<Self, DeviceEnhancerError> {
         let chain = device.chain(fsrcnn, estimator, bridge)?.ok_or(DeviceEnhancerError::NoGpu)?;
-        Ok(Self { chain, backend: device.backend(), batch: device.batch() })
+        let backend = device.backend();
+        let uploads = device.uploads().ok_or(DeviceEnhancerError::NoGpu)?;
+        Ok(Self { chain, backend, uploads, batch: device.batch() })
+    }
+
+    /// Uploads images of 32 x 32, values in [0, 1], and enhances them; otherwise as
+    /// [`enhance`](Self::enhance). Images beyond the device's largest buffer are uploaded in parts.
+    pub(super) fn enhance_values(
+        &self,
+        values: &[f32],
+        depth: Option<&DepthMaps>,
+        options: &Options,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<Enhanced, DeviceEnhancerError> {
+        const AREA: usize = fusion::SIDE * fusion::SIDE;
+        let mut all = Enhanced::default();
+        for (index, part) in values.chunks(UPLOADED * AREA).enumerate() {
+            let images = DeviceImages::upload(&self.uploads, part, AREA)?;
+            let (first, count) = (index * UPLOADED, part.len() / AREA);
+            let depth = depth.map(|depth| depth.of(first, count));
+            let mut told = |done| progress(first + done);
+            all.append(self.enhance(&images, 1.0, depth.as_ref(), options, &mut told)?);
+        }
+        Ok(all)
     }
 
     /// Enhances images on the networks' device, with their depth maps. Values are divided by
@@ -103,36 +147,48 @@ impl DeviceEnhancer {
         if !(white > 0.0 && white.is_finite()) {
             return Err(DeviceEnhancerError::White { found: white });
         }
+        options.measured.expect_side(fusion::SIDE)?;
         if options.copies > 0 {
             return Err(DeviceEnhancerError::Copies);
         }
-        let mut all = Enhanced::default();
-        for first in (0..images.frames()).step_by(self.batch) {
-            let part = first..images.frames().min(first + self.batch);
+        let batches: Vec<_> = (0..images.frames())
+            .step_by(self.batch)
+            .map(|first| first..images.frames().min(first + self.batch))
+            .collect();
+        let run = |part: &Range<usize>| {
             let mut planes = Vec::new();
             if depth.is_some() {
                 planes.reserve(2 * part.len() * images.pixels());
                 part.clone().for_each(|image| push_planes(depth, image, &mut planes));
             }
-            let guess = self.chain.run(images, part, white, &planes, options.estimate);
-            all.append(finished(guess, options)?);
-            progress(all.estimates.len());
+            finished(self.chain.run(images, part.clone(), white, &planes, options)?, options)
+        };
+        let mut all = Enhanced::default();
+        for together in batches.chunks(AT_A_TIME) {
+            let done: Vec<_> = together.par_iter().map(run).collect();
+            for enhanced in done {
+                all.append(enhanced?);
+                progress(all.estimates.len());
+            }
         }
         Ok(all)
     }
 }
 
-/// The steps of [`Enhancer`](super::Enhancer) after the networks.
-fn finished(guess: Guess, options: &Options) -> Result<Enhanced, MeasuredRowsError> {
-    let Guess { readings, estimates, start, mut sharp } = guess;
-    let constraint = constraint_on(&readings, &estimates, options)?;
-    constraint.correct(&mut sharp);
-    let inconsistency = constraint.residual_ratios(&sharp);
+/// The results, with the agreement that a device without room for its kernel leaves to the host.
+fn finished(guess: Guess, options: &Options) -> Result<Enhanced, DeviceEnhancerError> {
+    let Guess { estimated, start, mut images, mut inconsistency, readings } = guess;
+    let estimates = super::known(options, &estimated);
+    if !readings.is_empty() {
+        let constraint = constraint_on(&readings, &estimates, options)?;
+        constraint.correct(&mut images);
+        inconsistency = constraint.residual_ratios(&images);
+    }
     Ok(Enhanced {
-        images: sharp,
+        images,
         upscaled: Some(start),
         estimates,
-        estimated: None,
+        estimated: Some(estimated),
         inconsistency,
         spread: None,
     })

@@ -52,13 +52,17 @@ impl KnownEstimate {
         }
     }
 
+    /// The smallest and the largest estimate. An estimate clamped to them is the corrected estimate.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn bounds(self) -> [Estimate; 2] {
+        [0.0, f32::MAX].map(|bound| self.over(Estimate { sigma_px: bound, noise: bound }))
+    }
+
     /// The path's two numbers, then the minimum and maximum of blur and of noise on the scale of
     /// the networks. An estimate clamped to these bounds is the corrected estimate.
     #[cfg(feature = "gpu")]
     pub(crate) fn condition_bounds(self, path: [f32; 2]) -> [f32; 6] {
-        let least = self.over(Estimate { sigma_px: 0.0, noise: 0.0 }).conditions(path);
-        let most = Estimate { sigma_px: f32::MAX, noise: f32::MAX };
-        let most = self.over(most).conditions(path);
+        let [least, most] = self.bounds().map(|bound| bound.conditions(path));
         [path[0], path[1], least[2], most[2], least[4], most[4]]
     }
 }

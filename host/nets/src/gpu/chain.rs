@@ -1,20 +1,24 @@
-//! Estimator, FSRCNN and one step of the bridge, one after another, for images that are already on
-//! the device.
+//! Estimator, FSRCNN, one step of the bridge and the agreement with the readings, one after another,
+//! for images that are already on the device.
 //!
-//! No data comes to the host between the images and the guess; one read at the end fetches all
+//! No data comes to the host between the images and the results; one read at the end fetches all
 //! results (`enhance::device::tests::images_that_are_there_become_what_the_processor_makes_of_them`
 //! checks the results).
 
 use std::ops::Range;
 use std::sync::Arc;
 
+use nirspi_gpu::agreement::Agreement;
 use nirspi_gpu::network::Degraded;
-use nirspi_gpu::{Buffer, Kernels};
+use nirspi_gpu::network::plan::frames_at_once;
+use nirspi_gpu::{Buffer, GpuError, Kernels};
 use nirspi_recon::omp::gpu::DeviceImages;
 
-use super::{Estimator, Fsrcnn, Multiplier, UNet};
+use super::{Estimator, Fsrcnn, UNet};
+use crate::consistency;
 use crate::deblur::SIDE;
-use crate::enhance::KnownEstimate;
+use crate::device::{Device, Note, Notes};
+use crate::enhance::{KnownEstimate, Options};
 use crate::estimate::Estimate;
 use crate::fusion;
 use crate::network::{Guess, RunChain};
@@ -26,6 +30,7 @@ pub(crate) struct Chain {
     fsrcnn: Fsrcnn,
     estimator: Estimator,
     unet: UNet,
+    notes: Notes,
 }
 
 impl Chain {
@@ -34,28 +39,30 @@ impl Chain {
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
     pub(crate) fn new(
+        device: &Device,
         engine: &Arc<dyn Kernels>,
-        fsrcnn: &Weights,
-        estimator: &Weights,
-        (bridge, multiplier): (&Weights, Option<Multiplier>),
+        [fsrcnn, estimator, bridge]: [&Weights; 3],
     ) -> Result<Self, WeightsError> {
+        let multiplier = device.multiplier(engine.as_ref());
         Ok(Self {
             engine: Arc::clone(engine),
             fsrcnn: Fsrcnn::new(engine, fsrcnn)?,
             estimator: Estimator::new(engine, estimator)?,
             unet: UNet::new(engine, bridge, multiplier)?.compared(),
+            notes: device.shared_notes(),
         })
     }
 
-    /// The guesses for `frames` images, beginning with number `first`.
+    /// Appends the results for `frames` images, beginning with number `first`.
     fn part(
         &self,
         images: &Buffer,
         (first, frames): (usize, usize),
         white: f32,
         depth: &[f32],
-        known: KnownEstimate,
-    ) -> Guess {
+        (known, agreement): (KnownEstimate, Option<&Agreement>),
+        all: &mut Guess,
+    ) -> Result<(), GpuError> {
         let on = self.engine.as_ref();
         let (coarse, area) = ((frames, fusion::SIDE), fusion::SIDE * fusion::SIDE);
         let readings = on.readings(images, first * area, white, frames * area);
@@ -68,14 +75,24 @@ impl Chain {
         let conditions = on.conditions(&outputs, &bounds, grid);
         let seen = Degraded::Coarse(&readings);
         let size = (frames, SIDE);
-        let [readings, outputs, start, sharp] = self.unet.read_after(|| {
-            let sharp = self.unet.forward(size, &start, seen, &conditions, Some(&start));
-            [readings.clone(), outputs.clone(), start.clone(), sharp]
-        });
-        let estimates = outputs.as_chunks().0.iter();
-        let estimates =
-            estimates.map(|&two| known.over(Estimate::of_outputs(two, fusion::SIDE))).collect();
-        Guess { readings, estimates, start, sharp }
+        let sharp = || self.unet.forward(size, &start, seen, &conditions, Some(&start));
+        let read = match agreement {
+            Some(agreement) => self.unet.read_after(|| {
+                let agreed = on.agree(agreement, &readings, &sharp(), &outputs, frames);
+                [outputs.clone(), start.clone(), agreed.images, agreed.ratios]
+            }),
+            None => {
+                self.unet.read_after(|| [outputs.clone(), start.clone(), sharp(), readings.clone()])
+            }
+        };
+        let [outputs, start, images, last] = read?;
+        let each = outputs.floats().as_chunks().0.iter();
+        all.estimated.extend(each.map(|&two| Estimate::of_outputs(two, fusion::SIDE)));
+        all.start.extend_from_slice(start.floats());
+        all.images.extend_from_slice(images.floats());
+        let rest = if agreement.is_some() { &mut all.inconsistency } else { &mut all.readings };
+        rest.extend_from_slice(last.floats());
+        Ok(())
     }
 }
 
@@ -86,21 +103,31 @@ impl RunChain for Chain {
         part: Range<usize>,
         white: f32,
         depth: &[f32],
-        known: KnownEstimate,
-    ) -> Guess {
+        options: &Options,
+    ) -> Result<Guess, GpuError> {
         let images = images.buffer();
         let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
         let at_once = self.unet.at_once(SIDE).min(coarse);
+        let on = self.engine.as_ref();
+        let rows = &options.measured;
+        let agreement = consistency::agreement(on, rows, options.consistency, options.estimate);
+        let agreement = agreement
+            .map_err(|error| self.notes.add(Note::AgreementOnCpu { why: error.to_string() }))
+            .ok();
+        let scratch = agreement.as_ref().map_or(0, Agreement::scratch);
+        let at_once = frames_at_once(scratch, on.limits().buffer_bytes, at_once);
         let planes = 2 * fusion::SIDE * fusion::SIDE;
-        let mut all = Guess::default();
+        let area = SIDE * SIDE;
+        let mut all = Guess::with_capacity(part.len() * area);
         for first in part.clone().step_by(at_once) {
             let frames = at_once.min(part.end - first);
             let depth = match depth {
                 [] => &[],
                 _ => &depth[(first - part.start) * planes..][..frames * planes],
             };
-            all.append(self.part(images, (first, frames), white, depth, known));
+            let known = (options.estimate, agreement.as_ref());
+            self.part(images, (first, frames), white, depth, known, &mut all)?;
         }
-        all
+        Ok(all)
     }
 }

@@ -3,6 +3,7 @@
 //! buffers are full of NaN before a kernel writes them, so a test notices each number that the kernel left
 //! unwritten.
 
+mod agreement;
 mod products;
 
 use std::sync::Arc;

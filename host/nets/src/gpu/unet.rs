@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nirspi_gpu::network::plan::frames_at_once;
 use nirspi_gpu::network::{Activation, Add, Degraded, Finish, Layer, Made, Way};
-use nirspi_gpu::{Buffer, Kernels};
+use nirspi_gpu::{Buffer, GpuError, Kernels, Numbers};
 
 use super::layer::{self, Maker, checked};
 use super::multiplier::Multiplier;
@@ -112,25 +112,27 @@ impl UNet {
     /// Runs `forward` and reads the buffers that it returns. If an activation in it was not a number
     /// of `f16`, the tensor cores are given up and it runs again.
     ///
-    /// # Panics
-    /// If the GPU or its driver fails while it computes.
+    /// # Errors
+    /// [`GpuError`] if the GPU or its driver fails while it computes.
     pub(super) fn read_after<const N: usize>(
         &self,
         forward: impl Fn() -> [Buffer; N],
-    ) -> [Vec<f32>; N] {
+    ) -> Result<[Numbers; N], GpuError> {
         let on = self.engine.as_ref();
+        let as_many = |read: Vec<Numbers>| {
+            read.try_into().unwrap_or_else(|_| unreachable!("as many as were made"))
+        };
         if let (Some(multiplier), false) = (&self.multiplier, self.is_plain()) {
             let made = forward();
             let all: Vec<&Buffer> = made.iter().chain([multiplier.beyond()]).collect();
-            let mut read = super::read(on, &all);
-            if read.pop().is_some_and(|beyond| beyond == [0.0]) {
-                return read.try_into().unwrap_or_else(|_| unreachable!("as many as were made"));
+            let mut read = on.read(&all)?;
+            if read.pop().is_some_and(|beyond| beyond.floats() == [0.0]) {
+                return Ok(as_many(read));
             }
             multiplier.note(Note::BeyondF16);
             self.plain.store(true, Ordering::Relaxed);
         }
-        let read = super::read(on, &forward().each_ref());
-        read.try_into().unwrap_or_else(|_| unreachable!("as many as were made"))
+        on.read(&forward().each_ref()).map(as_many)
     }
 
     /// The same network after a comparison: one image of noise goes through it by the tensor cores,
@@ -164,8 +166,10 @@ impl UNet {
 
     /// Number of images of `side` x `side` that the network processes at once.
     pub(super) fn at_once(&self, side: usize) -> usize {
-        let largest = self.channels * (side / 2) * (side / 2);
-        frames_at_once(largest.max(2 * side * side), self.engine.limits().buffer_bytes, AT_ONCE)
+        let largest = (self.channels * (side / 2) * (side / 2)).max(2 * side * side);
+        // About eight buffers of this size live at a time, and two batches are under way. A device
+        // allows buffers of a fourth of its memory, so these sixteen fit all of it.
+        frames_at_once(4 * largest, self.engine.limits().buffer_bytes, AT_ONCE)
     }
 
     /// The network's output for `frames` images of `side` x `side`, given their conditions (frames,
@@ -298,7 +302,10 @@ impl RunUNet for UNet {
                 [current, degraded, conditions.as_flattened()].map(|numbers| on.upload(numbers));
             let size = (conditions.len(), side);
             let seen = Degraded::Fine(&degraded);
-            self.read_after(|| [self.forward(size, &current, seen, &told, None)])[0].clone()
+            match self.read_after(|| [self.forward(size, &current, seen, &told, None)]) {
+                Ok([images]) => images.floats().to_vec(),
+                Err(error) => panic!("{error}"),
+            }
         });
         parts.collect()
     }

@@ -2,39 +2,43 @@
 
 use std::ops::Range;
 
+use nirspi_gpu::GpuError;
 use nirspi_recon::omp::gpu::DeviceImages;
 
 use crate::device::Device;
-use crate::enhance::KnownEstimate;
+use crate::enhance::Options;
 use crate::estimate::Estimate;
 use crate::gpu;
 use crate::weights::{Weights, WeightsError};
 
-/// The networks' results for some images, on the host.
+/// The results for some images, on the host.
 #[derive(Default)]
 pub(crate) struct Guess {
-    /// (N, 32, 32) in [0, 1].
-    pub(crate) readings: Vec<f32>,
-    pub(crate) estimates: Vec<Estimate>,
+    /// As the estimator found them.
+    pub(crate) estimated: Vec<Estimate>,
     /// (N, 64, 64) in [0, 1]: FSRCNN's output.
     pub(crate) start: Vec<f32>,
-    /// (N, 64, 64): the bridge's output after one step from `start`; not clamped.
-    pub(crate) sharp: Vec<f32>,
+    /// (N, 64, 64): the bridge's output after one step from `start`; not clamped if there are
+    /// `readings`, else in agreement with them.
+    pub(crate) images: Vec<f32>,
+    /// The inconsistency of each image; none if there are `readings`.
+    pub(crate) inconsistency: Vec<f32>,
+    /// (N, 32, 32) in [0, 1], if the device could not compute the agreement with them.
+    pub(crate) readings: Vec<f32>,
 }
 
 impl Guess {
-    /// Appends the results for further images.
-    pub(crate) fn append(&mut self, mut other: Self) {
-        self.readings.append(&mut other.readings);
-        self.estimates.append(&mut other.estimates);
-        self.start.append(&mut other.start);
-        self.sharp.append(&mut other.sharp);
+    /// No results yet, and room for images with this number of pixels in all.
+    pub(crate) fn with_capacity(pixels: usize) -> Self {
+        let [start, images] = [(); 2].map(|()| Vec::with_capacity(pixels));
+        Self { start, images, ..Self::default() }
     }
 }
 
-/// The three networks on one GPU.
-pub(crate) trait RunChain: Send {
-    /// The results for some of the images, with `white` scaled to 1. `depth` is (N, 2, 32, 32), see
+/// The three networks and the agreement with the readings on one GPU.
+pub(crate) trait RunChain: Send + Sync {
+    /// The results for some of the images, with `white` scaled to 1. Fails if the GPU or its driver
+    /// fails. `depth` is (N, 2, 32, 32), see
     /// [`push_planes`](crate::fusion::push_planes); `None` without depth.
     fn run(
         &self,
@@ -42,8 +46,8 @@ pub(crate) trait RunChain: Send {
         part: Range<usize>,
         white: f32,
         depth: &[f32],
-        known: KnownEstimate,
-    ) -> Guess;
+        options: &Options,
+    ) -> Result<Guess, GpuError>;
 }
 
 impl Device {
@@ -55,7 +59,6 @@ impl Device {
         bridge: &Weights,
     ) -> Result<Option<Box<dyn RunChain>>, WeightsError> {
         let Some(engine) = self.engine() else { return Ok(None) };
-        let multiplier = self.multiplier(engine.as_ref());
-        Ok(Some(Box::new(gpu::Chain::new(&engine, fsrcnn, estimator, (bridge, multiplier))?)))
+        Ok(Some(Box::new(gpu::Chain::new(self, &engine, [fsrcnn, estimator, bridge])?)))
     }
 }

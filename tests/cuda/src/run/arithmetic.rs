@@ -113,7 +113,7 @@ fn integer(op: Op, bytes: usize, sign: bool, [a, b, c, d]: [u64; 4]) -> u64 {
         Op::Add => a.wrapping_add(b),
         Op::Subtract => a.wrapping_sub(b),
         Op::Multiply => a.wrapping_mul(b),
-        Op::MultiplyHigh => (wide(a) * wide(b) >> bits) as u64,
+        Op::MultiplyHigh => ((wide(a) * wide(b)) >> bits) as u64,
         Op::MultiplyWide => return low((wide(a) * wide(b)) as u64, 2 * bytes),
         Op::MultiplyAdd => a.wrapping_mul(b).wrapping_add(c),
         Op::MultiplyAddWide => {
@@ -130,13 +130,7 @@ fn integer(op: Op, bytes: usize, sign: bool, [a, b, c, d]: [u64; 4]) -> u64 {
         Op::Or => a | b,
         Op::Xor => a ^ b,
         Op::Not => !a,
-        Op::Left => {
-            if shift < u64::from(bits) {
-                a << shift
-            } else {
-                0
-            }
-        }
+        Op::Left if shift < u64::from(bits) => a << shift,
         Op::Right => (wide(a) >> shift.min(127)) as u64,
         Op::Funnel => {
             let pair = low(b, 4) << 32 | low(a, 4);

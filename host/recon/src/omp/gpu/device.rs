@@ -33,20 +33,15 @@ impl Device {
         Ok(found.map(|gpu| Self::of(&gpu)))
     }
 
-    fn of(gpu: &Gpu) -> Self {
+    /// The device of a GPU that was found before.
+    #[must_use]
+    pub fn of(gpu: &Gpu) -> Self {
         Self {
             engine: nirspi_gpu::open(gpu),
             name: gpu.name().to_owned(),
             backend: probe::backend(gpu),
             software: gpu.is_software(),
         }
-    }
-
-    /// A device that writes the CUDA source of its kernels, and gives zeros for results.
-    #[cfg(feature = "source")]
-    #[must_use]
-    pub fn source(card: nirspi_gpu::source::Card) -> Self {
-        Self::of(&card.into())
     }
 
     /// The device's name in its driver.

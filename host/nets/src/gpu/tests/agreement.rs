@@ -1,0 +1,134 @@
+//! The agreement with the readings on each GPU, against the processor's.
+
+use super::*;
+use crate::consistency::{Consistency, MeasuredRows, agreement};
+use crate::deblur::AREA;
+use crate::fusion;
+use crate::random::Noise;
+use crate::{Estimate, KnownEstimate};
+
+/// A scene, readings of it under this blur and noise, and a guess that is wrong by `error`.
+struct Case {
+    what: &'static str,
+    estimate: Estimate,
+    readings: Vec<f32>,
+    guess: Vec<f32>,
+}
+
+/// A guess that is clamped, and otherwise stays as it is.
+const INSIDE: &str = "inside the ball";
+
+/// Means of 2 x 2 pixels.
+fn halved(image: &[f32]) -> Vec<f32> {
+    let pixel = |i: usize| {
+        let first = i / 32 * 2 * 64 + i % 32 * 2;
+        [0, 1, 64, 65].map(|more| image[first + more]).iter().sum::<f32>() / 4.0
+    };
+    (0..1024).map(pixel).collect()
+}
+
+fn scene(seed: usize) -> Vec<f32> {
+    let wave = |i: usize| {
+        let (x, y) = ((i % 64) as f32, (i / 64) as f32);
+        let edge = f32::from(u8::from((x - 30.0).abs() < 9.0 || (y - 20.0).abs() < 4.0));
+        0.5 * edge + 0.25 + 0.2 * (0.2 * x + seed as f32).sin() * (0.13 * y).cos()
+    };
+    (0..AREA).map(wave).collect()
+}
+
+fn case(
+    what: &'static str,
+    (sigma_px, noise): (f32, f32),
+    (true_noise, error): (f32, f32),
+    seed: usize,
+) -> Case {
+    let truth = scene(seed);
+    let mut noises = Noise::of(5, seed);
+    let readings = halved(&truth).iter().map(|v| v + true_noise * noises.draw()).collect();
+    let guess = truth.iter().map(|v| v + error * noises.draw()).collect();
+    Case { what, estimate: Estimate { sigma_px, noise }, readings, guess }
+}
+
+/// Every case is a frame of one launch.
+fn cases() -> Vec<Case> {
+    vec![
+        case("moved onto the ball", (1.0, 0.02), (0.02, 0.3), 0),
+        case(INSIDE, (0.5, 0.2), (0.02, 0.01), 1),
+        case("too much blur: the least lambda", (6.0, 0.005), (0.005, 0.3), 2),
+        case("no blur", (0.0, 0.01), (0.01, 0.2), 3),
+        case("less noise than the least", (0.7, 0.0001), (0.001, 0.1), 4),
+        case("noise only, and outside [0, 1]", (1.5, 0.1), (0.3, 1.0), 5),
+        case("much blur and noise", (4.0, 0.05), (0.05, 0.5), 6),
+    ]
+}
+
+fn rows(which: impl Fn(u32) -> bool) -> MeasuredRows {
+    MeasuredRows::new(fusion::SIDE, &(0..1024).filter(|&row| which(row)).collect::<Vec<_>>())
+        .unwrap()
+}
+
+#[test]
+fn images_agree_as_on_the_processor() {
+    let cases = cases();
+    let all = |of: &dyn Fn(&Case) -> Vec<f32>| cases.iter().flat_map(of).collect::<Vec<f32>>();
+    let outputs = all(&|case| vec![case.estimate.sigma_px / 8.0, case.estimate.noise * 10.0]);
+    let measured = [
+        ("all rows", MeasuredRows::All),
+        ("the first half", rows(|row| row < 512)),
+        ("one row", rows(|row| row == 0)),
+    ];
+    for (backend, engine) in engines() {
+        let on = engine.as_ref();
+        let readings = on.upload(&all(&|case| case.readings.clone()));
+        let guesses = on.upload(&all(&|case| case.guess.clone()));
+        let outputs = on.upload(&outputs);
+        for ((rows, measured), binding) in
+            measured.iter().flat_map(|rows| [(rows, true), (rows, false)])
+        {
+            let law = agreement(on, measured, binding, KnownEstimate::default()).unwrap();
+            let made = on.agree(&law, &readings, &guesses, &outputs, cases.len());
+            let (images, ratios) = (read(on, &made.images), read(on, &made.ratios));
+            let each = images.chunks_exact(AREA).zip(ratios).zip(&cases);
+            for ((ours, ratio), case) in each {
+                let Estimate { sigma_px, noise } = case.estimate;
+                let model = Consistency::new(fusion::SIDE, sigma_px, noise).of_rows(measured);
+                let model = model.unwrap();
+                let mut theirs: Vec<f32> = case.guess.iter().map(|v| v.clamp(0.0, 1.0)).collect();
+                if binding {
+                    model.project(&case.readings, &mut theirs);
+                    theirs.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
+                }
+                let what = format!("{backend}: {}, {rows}, binding: {binding}", case.what);
+                if case.what == INSIDE {
+                    assert_eq!(ours, theirs, "{what}");
+                }
+                let apart = ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs());
+                let apart = apart.fold(0.0, |most, v| if v <= most { most } else { v });
+                // Both solve the equation of missing rows to a residual of 1e-3.
+                assert!(apart < 2e-4, "{what}: {apart}");
+                let expected = model.residual_ratio(&case.readings, &theirs);
+                assert!(
+                    (ratio - expected).abs() < 1e-3 * (1.0 + expected),
+                    "{what}: {ratio} {expected}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_the_caller_knows_is_used_in_place_of_the_estimate() {
+    let known = KnownEstimate { sigma_px: Known::Exactly(2.0), noise: Known::AtLeast(0.03) };
+    let case = case("known", (2.0, 0.03), (0.02, 0.3), 9);
+    for (backend, engine) in engines() {
+        let on = engine.as_ref();
+        let [readings, guess] = [&case.readings, &case.guess].map(|numbers| on.upload(numbers));
+        let image = |outputs: [f32; 2], known| {
+            let law = agreement(on, &MeasuredRows::All, true, known).unwrap();
+            let made = on.agree(&law, &readings, &guess, &on.upload(&outputs), 1);
+            read(on, &made.images)
+        };
+        let told = image([0.25, 0.3], KnownEstimate::default());
+        assert_close(&image([0.9, 0.001], known), &told, &format!("{backend}"));
+    }
+}
