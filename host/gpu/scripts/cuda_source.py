@@ -14,6 +14,9 @@ the source to PTX with the options that CubeCL uses, `ptxas` compiles the PTX as
 A new kernel appears here by itself as soon as the networks or OMP launch it. For another one,
 launch it in host/nets/examples/cuda_source.rs.
 
+CubeCL's text of a kernel is not the same in each run: arrays in shared memory stand in another order, and with it
+registers and spills change a little. To compare two versions, take the numbers of several runs.
+
 Columns of the table:
 
     regs         registers of a thread
@@ -258,7 +261,8 @@ def main() -> int:
     for line in wrong:
         print(line, file=sys.stderr)
     if not wrong:
-        print("every kernel compiles, without spills")
+        spilled = f", with no more spills than {' and '.join(arguments.allow)}" if allowed else ", without spills"
+        print(f"every kernel compiles{spilled}")
     return 1 if wrong else 0
 
 
