@@ -42,6 +42,7 @@ by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
+    "cuda-source     every GPU kernel compiles for NVIDIA's GPUs and keeps to its registers, without a GPU; PyPI, 300 MB"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
     "loom            hand-overs between threads of the live page and of a recording, in every order of the threads; crates.io"
@@ -435,6 +436,15 @@ step_mutations() {
 # One fault after another in a copy of the tree, each against the tests of its own crate: docs/mutants.md. Crates in
 # MUTANTS are tried whole; without it, lines that differ from MUTANTS_SINCE (default: main). MUTANTS_SHARD=0/8 tries an
 # eighth of the faults. The exit status is that of cargo-mutants: 2 if a fault was missed.
+step_cuda_source() {
+    # A feature that no other step has.
+    cargo clippy --locked -p nirspi-nets --features source --lib --example cuda_source -- -D warnings
+    cargo test --locked -p nirspi-gpu --features source --lib source::
+    # Two kernels are known to spill 4 to 24 bytes, more or fewer from run to run; more than 32 is an error.
+    python3 host/gpu/scripts/cuda_source.py --allow 'agreement-kernels-agree-binding-sampled-*=32' \
+        --allow 'network-tensor-convolve-*-planes1-lines1-*=32'
+}
+
 step_mutants() {
     tool cargo-mutants 27.1.0
     local chosen=() crate since

@@ -5,6 +5,8 @@ use crate::agreement::Agree;
 use crate::limits::DeviceLimits;
 use crate::network::Convolve;
 use crate::pursuit::Pursue;
+#[cfg(feature = "source")]
+use crate::source::SourceRuntime;
 use cubecl::bytes::Bytes;
 use cubecl::cuda::CudaRuntime;
 use cubecl::prelude::*;
@@ -115,6 +117,8 @@ pub fn open(gpu: &Gpu) -> Arc<dyn Kernels> {
         Gpu::Cuda(found) => Arc::new(CudaRuntime::client(&found.device)),
         #[cfg(feature = "wgpu")]
         Gpu::Wgpu(found) => Arc::new(WgpuRuntime::client(&found.device)),
+        #[cfg(feature = "source")]
+        Gpu::Source(found) => Arc::new(SourceRuntime::client(&found.device)),
     }
 }
 

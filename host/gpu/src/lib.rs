@@ -11,6 +11,7 @@
 //! | [`pursuit`] | orthogonal matching pursuit of many frames, for `nirspi-recon` |
 //! | [`network`] | convolutional networks, for `nirspi-nets` |
 //! | [`agreement`] | agreement of images with their readings, for `nirspi-nets` |
+//! | `source` | with the feature `source`: the CUDA source of every kernel, without a GPU |
 //!
 //! This crate alone uses CubeCL, for two reasons. Generic code of CubeCL's runtimes is compiled
 //! once, where each crate that launches a kernel would compile its own copy. And all launches, with
@@ -28,6 +29,8 @@ pub mod limits;
 pub mod network;
 pub mod probe;
 pub mod pursuit;
+#[cfg(feature = "source")]
+pub mod source;
 
 pub use engine::{Buffer, Engine, GpuError, Kernels, Numbers, open};
 pub use probe::Gpu;

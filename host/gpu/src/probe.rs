@@ -4,6 +4,8 @@
 //! CubeCL, which would panic without them.
 
 use crate::cache::{self, Compiled};
+#[cfg(feature = "source")]
+use crate::source::Card;
 use cubecl::cuda::{CudaDevice, install::cuda_path};
 #[cfg(feature = "wgpu")]
 use cubecl::wgpu::WgpuDevice;
@@ -59,6 +61,9 @@ pub enum Gpu {
     /// Through Vulkan, Metal or DirectX.
     #[cfg(feature = "wgpu")]
     Wgpu(Found<WgpuDevice>),
+    /// None: kernels are written as CUDA source.
+    #[cfg(feature = "source")]
+    Source(Found<Card>),
 }
 
 impl Gpu {
@@ -69,6 +74,8 @@ impl Gpu {
             Self::Cuda(found) => &found.name,
             #[cfg(feature = "wgpu")]
             Self::Wgpu(found) => &found.name,
+            #[cfg(feature = "source")]
+            Self::Source(found) => &found.name,
         }
     }
 
@@ -79,13 +86,21 @@ impl Gpu {
             Self::Cuda(found) => found.software,
             #[cfg(feature = "wgpu")]
             Self::Wgpu(found) => found.software,
+            #[cfg(feature = "source")]
+            Self::Source(found) => found.software,
         }
     }
 
     /// Whether the device computes through CUDA.
     #[must_use]
     pub fn is_cuda(&self) -> bool {
-        matches!(self, Self::Cuda(_))
+        match self {
+            Self::Cuda(_) => true,
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu(_) => false,
+            #[cfg(feature = "source")]
+            Self::Source(_) => true,
+        }
     }
 }
 

@@ -72,6 +72,19 @@ impl Device {
         }
     }
 
+    #[cfg(feature = "gpu")]
+    fn on(gpu: Gpu) -> Self {
+        let name = gpu.name().to_owned();
+        Self::of(Kind::Gpu(gpu), name)
+    }
+
+    /// A device that writes the CUDA source of its kernels, and gives zeros for results.
+    #[cfg(feature = "source")]
+    #[must_use]
+    pub fn source(card: nirspi_gpu::source::Card) -> Self {
+        Self::on(card.into())
+    }
+
     /// The same device with this arithmetic. Where the device does not have it, networks compute in
     /// [`Arithmetic::F32`], and [`notes`](Self::notes) say so.
     #[must_use]
@@ -164,6 +177,15 @@ impl Device {
         }
     }
 
+    /// The same device, for images that come from OMP or from the host; `None` for the processor.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn uploads(&self) -> Option<nirspi_recon::omp::gpu::Device> {
+        match &self.kind {
+            Kind::Cpu => None,
+            Kind::Gpu(gpu) => Some(nirspi_recon::omp::gpu::Device::of(gpu)),
+        }
+    }
+
     /// Number of images that keep the device busy.
     pub(crate) fn batch(&self) -> usize {
         match self.kind {
@@ -177,10 +199,7 @@ impl Device {
 #[cfg(feature = "gpu")]
 fn find(backend: Backend) -> Result<Device, String> {
     let found = probe::find(backend).map_err(|missing| missing.to_string())?;
-    Ok(found.map_or_else(Device::cpu, |gpu| {
-        let name = gpu.name().to_owned();
-        Device::of(Kind::Gpu(gpu), name)
-    }))
+    Ok(found.map_or_else(Device::cpu, Device::on))
 }
 
 #[cfg(not(feature = "gpu"))]

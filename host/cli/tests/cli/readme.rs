@@ -47,7 +47,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/live-page.md", "curl", "needs the page of another terminal; tests/cli/serve.rs"),
     ("docs/mutants.md", "cargo mutants", "hours; .ci/run mutants"),
     ("docs/performance.md", "host/scripts/live_speed.py", "a minute, on a quiet machine"),
-    ("docs/performance.md", "host/recon/benches/gpu.sh", "needs a GPU"),
+    ("docs/performance.md", "host/gpu/benches/gpu.sh", "needs a GPU"),
     ("docs/quality.md", "eval quality", "needs data of other groups; tests/cli/quality.rs"),
     ("docs/quality.md", "eval table", "minutes; tests/cli/rain.rs has fewer scenes"),
     ("docs/quality.md", "metrics sharp.npy", "the user's stacks; tests/cli/metrics.rs"),

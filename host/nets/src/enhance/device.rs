@@ -98,8 +98,7 @@ impl DeviceEnhancer {
     ) -> Result<Self, DeviceEnhancerError> {
         let chain = device.chain(fsrcnn, estimator, bridge)?.ok_or(DeviceEnhancerError::NoGpu)?;
         let backend = device.backend();
-        let uploads =
-            gpu::Device::open(backend).ok().flatten().ok_or(DeviceEnhancerError::NoGpu)?;
+        let uploads = device.uploads().ok_or(DeviceEnhancerError::NoGpu)?;
         Ok(Self { chain, backend, uploads, batch: device.batch() })
     }
 

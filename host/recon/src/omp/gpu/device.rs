@@ -2,8 +2,8 @@
 
 use crate::backend::probe;
 use crate::omp::{Backend, BackendError};
-use nirspi_gpu::Kernels;
 use nirspi_gpu::limits::DeviceLimits;
+use nirspi_gpu::{Gpu, Kernels};
 use std::fmt;
 use std::sync::Arc;
 
@@ -30,12 +30,18 @@ impl Device {
     pub fn open(backend: Backend) -> Result<Option<Self>, BackendError> {
         let found = probe::find(backend)
             .map_err(|missing| BackendError::Absent { why: missing.to_string() })?;
-        Ok(found.map(|gpu| Self {
-            engine: nirspi_gpu::open(&gpu),
+        Ok(found.map(|gpu| Self::of(&gpu)))
+    }
+
+    /// The device of a GPU that was found before.
+    #[must_use]
+    pub fn of(gpu: &Gpu) -> Self {
+        Self {
+            engine: nirspi_gpu::open(gpu),
             name: gpu.name().to_owned(),
-            backend: probe::backend(&gpu),
+            backend: probe::backend(gpu),
             software: gpu.is_software(),
-        }))
+        }
     }
 
     /// The device's name in its driver.
