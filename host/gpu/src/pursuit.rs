@@ -26,6 +26,7 @@ use crate::Buffer;
 use crate::engine::{Engine, upload_doubles};
 use crate::limits::ROUNDS;
 use budget::row_launches;
+use cubecl::ir::{ElemType, FloatKind};
 use cubecl::prelude::*;
 use layout::{STATE, Shape, TOGETHER};
 
@@ -242,7 +243,12 @@ impl<R: Runtime> Pursue for ComputeClient<R> {
     }
 
     fn has_doubles(&self) -> bool {
-        self.features().supports_type(f64::as_type_native_unchecked())
+        let double = ElemType::Float(FloatKind::F64);
+        // CubeCL does not name f64 for CUDA, because its products of matrices fail with it; it does
+        // name sums by several units at once, which every GPU since 2016 has.
+        let atomic = Type::new(StorageType::Atomic(double));
+        let features = self.features();
+        features.supports_type(double) || !features.atomic_type_usage(atomic).is_empty()
     }
 
     fn has_referee(&self, shape: &Shape) -> bool {

@@ -142,7 +142,7 @@ impl Networks {
             match self.device_enhancer() {
                 Ok(on_device) => return Ok(enhancer.with_device(on_device)),
                 Err(DeviceEnhancerError::Weights(error)) => return Err(error),
-                Err(_) => {}
+                Err(why) => self.device.tell_through_host(why.to_string()),
             }
         }
         Ok(enhancer)

@@ -109,6 +109,12 @@ impl Device {
         self.notes.take()
     }
 
+    /// Notes that images come to the host between the networks.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn tell_through_host(&self, why: String) {
+        self.notes.add(Note::ThroughHost { why });
+    }
+
     /// The notes, for a network on this device to add to.
     #[cfg(feature = "gpu")]
     pub(crate) fn shared_notes(&self) -> Notes {

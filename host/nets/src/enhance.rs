@@ -211,6 +211,7 @@ impl Enhancer {
         progress: &mut dyn FnMut(usize),
     ) -> Result<Enhanced, EnhanceError> {
         const SIDE: usize = crate::fusion::SIDE;
+        options.measured.expect_side(SIDE)?;
         #[cfg(feature = "gpu")]
         if let Some(on_device) = self.on_device.as_ref().filter(|_| options.copies == 0) {
             return on_device

@@ -471,9 +471,9 @@ pub(super) fn agree(
             let mut after = 0.0f32;
             for back in 0..count {
                 let k = count - 1 - back;
+                // In the first round `after` is 0, for the last step's coupling leads out of the space.
                 after = (coefficients[k] - beside[k] * after) / pivots[k];
                 coefficients[k] = after;
-                // The last step's coupling leads out of the space.
             }
         }
         sync_cube();
@@ -523,9 +523,14 @@ pub(super) fn agree(
         }
         sync_cube();
     }
+    // Limits hide NaN, so it is looked for by its bits.
+    let mut broken = 0.0f32;
     #[unroll]
     for i in 0..16usize {
         let at = frame * comptime!(FINE * FINE) + (top + 4 * i) * FINE + x;
+        if u32::reinterpret(guesses[at]) & 0x7fff_ffffu32 > 0x7f80_0000u32 {
+            broken = 1.0f32;
+        }
         let mut value = min(max(guesses[at], 0.0f32), 1.0f32);
         if length > radius {
             value = min(max(value + change[i], 0.0f32), 1.0f32);
@@ -539,7 +544,12 @@ pub(super) fn agree(
         measured_part(&mut seen, &mut small, &mut half, tables);
     }
     let left = f32::sqrt(dot(&seen, &seen, &mut sums));
+    let broken = total(broken, &mut sums);
     if unit == 0 {
-        ratios[frame] = left / expected;
+        let mut ratio = left / expected;
+        if broken > 0.0f32 {
+            ratio = f32::reinterpret(0x7fc0_0000u32);
+        }
+        ratios[frame] = ratio;
     }
 }

@@ -193,7 +193,13 @@ pub(super) fn readings(
 ) {
     let at = ABSOLUTE_POS;
     if at < count as usize {
-        out[at] = min(max(images[first as usize + at] / white, 0.0f32), 1.0f32);
+        let image = images[first as usize + at];
+        let mut reading = min(max(image / white, 0.0f32), 1.0f32);
+        // Limits hide NaN; the last kernel tells it.
+        if u32::reinterpret(image) & 0x7fff_ffffu32 > 0x7f80_0000u32 {
+            reading = image;
+        }
+        out[at] = reading;
     }
 }
 

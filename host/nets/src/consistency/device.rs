@@ -5,6 +5,7 @@
 //! (`gpu::tests::agreement::images_agree_as_on_the_processor`).
 
 use nirspi_gpu::agreement::{Agreement, Law, Matrices, Told};
+use nirspi_gpu::limits::DeviceLimits;
 use nirspi_gpu::{GpuError, Kernels};
 
 use super::{BISECTIONS, LEAST_LAMBDA, MOST_LOG_LAMBDA, NOISE_FLOOR, OF_IMAGE, OF_READINGS, TAU};
@@ -14,12 +15,14 @@ use crate::estimate::{NOISE_SCALE, SIGMA_SCALE_PX};
 use crate::fusion;
 
 /// The agreement with readings of 32 x 32 that were made from these rows, for the estimator's
-/// outputs with what the caller knows. Images are moved only if it is `binding`.
+/// outputs with what the caller knows, on a device with these limits. Images are moved only if it is
+/// `binding`.
 ///
 /// # Errors
 /// [`GpuError::TooLarge`] if the kernel needs more than the device has.
 pub(crate) fn agreement(
     engine: &dyn Kernels,
+    limits: &DeviceLimits,
     rows: &MeasuredRows,
     binding: bool,
     known: KnownEstimate,
@@ -49,5 +52,5 @@ pub(crate) fn agreement(
         noise_scale: 1.0 / NOISE_SCALE,
         noise: [least.noise, most.noise],
     };
-    engine.agreement(&matrices, &law, &told)
+    engine.agreement(&matrices, &law, &told, limits)
 }

@@ -64,6 +64,11 @@ pub enum Note {
         /// What it needs, and what the device has.
         why: String,
     },
+    /// Images come to the host between the networks of a GPU, which takes longer.
+    ThroughHost {
+        /// Why.
+        why: String,
+    },
     /// The tensor cores did not give what the plain kernels give, or could not be used.
     TensorCoresDiffer,
 }
@@ -85,6 +90,9 @@ impl fmt::Display for Note {
             ),
             Self::AgreementOnCpu { why } => {
                 write!(f, "{why}; the CPU computes the agreement with the readings")
+            }
+            Self::ThroughHost { why } => {
+                write!(f, "{why}; images come to the CPU between the networks, which takes longer")
             }
             Self::TensorCoresDiffer => f.write_str(
                 "the tensor cores failed a comparison with the plain kernels; networks run without them",

@@ -63,6 +63,12 @@ pub enum DeviceEnhancerError {
     /// The images could not be uploaded.
     #[error(transparent)]
     Upload(#[from] OmpError),
+    /// A network gave NaN.
+    #[error("the networks gave NaN for image {image}")]
+    NotANumber {
+        /// Index of the image.
+        image: usize,
+    },
     /// The GPU or its driver failed.
     #[error(transparent)]
     Gpu(#[from] GpuError),
@@ -161,7 +167,8 @@ impl DeviceEnhancer {
                 planes.reserve(2 * part.len() * images.pixels());
                 part.clone().for_each(|image| push_planes(depth, image, &mut planes));
             }
-            finished(self.chain.run(images, part.clone(), white, &planes, options)?, options)
+            let guess = self.chain.run(images, part.clone(), white, &planes, options)?;
+            finished(guess, part.start, options)
         };
         let mut all = Enhanced::default();
         for together in batches.chunks(AT_A_TIME) {
@@ -176,13 +183,21 @@ impl DeviceEnhancer {
 }
 
 /// The results, with the agreement that a device without room for its kernel leaves to the host.
-fn finished(guess: Guess, options: &Options) -> Result<Enhanced, DeviceEnhancerError> {
+/// `first` is the index of the first image.
+fn finished(
+    guess: Guess,
+    first: usize,
+    options: &Options,
+) -> Result<Enhanced, DeviceEnhancerError> {
     let Guess { estimated, start, mut images, mut inconsistency, readings } = guess;
     let estimates = super::known(options, &estimated);
     if !readings.is_empty() {
         let constraint = constraint_on(&readings, &estimates, options)?;
         constraint.correct(&mut images);
         inconsistency = constraint.residual_ratios(&images);
+    }
+    if let Some(at) = inconsistency.iter().position(|ratio| ratio.is_nan()) {
+        return Err(DeviceEnhancerError::NotANumber { image: first + at });
     }
     Ok(Enhanced {
         images,

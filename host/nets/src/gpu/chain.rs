@@ -9,6 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nirspi_gpu::agreement::Agreement;
+use nirspi_gpu::limits::DeviceLimits;
 use nirspi_gpu::network::Degraded;
 use nirspi_gpu::network::plan::frames_at_once;
 use nirspi_gpu::{Buffer, GpuError, Kernels};
@@ -31,6 +32,8 @@ pub(crate) struct Chain {
     estimator: Estimator,
     unet: UNet,
     notes: Notes,
+    /// What the device allows for the agreement.
+    pub(crate) limits: DeviceLimits,
 }
 
 impl Chain {
@@ -50,6 +53,7 @@ impl Chain {
             estimator: Estimator::new(engine, estimator)?,
             unet: UNet::new(engine, bridge, multiplier)?.compared(),
             notes: device.shared_notes(),
+            limits: engine.limits(),
         })
     }
 
@@ -109,8 +113,8 @@ impl RunChain for Chain {
         let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
         let at_once = self.unet.at_once(SIDE).min(coarse);
         let on = self.engine.as_ref();
-        let rows = &options.measured;
-        let agreement = consistency::agreement(on, rows, options.consistency, options.estimate);
+        let Options { measured, consistency, estimate, .. } = options;
+        let agreement = consistency::agreement(on, &self.limits, measured, *consistency, *estimate);
         let agreement = agreement
             .map_err(|error| self.notes.add(Note::AgreementOnCpu { why: error.to_string() }))
             .ok();

@@ -68,6 +68,49 @@ fn images_that_are_there_become_what_the_processor_makes_of_them() {
 }
 
 #[test]
+fn where_the_agreement_does_not_fit_the_device_the_processor_makes_it_and_the_user_is_told() {
+    let weights =
+        ["fsrcnn", "estimator", "diffusion"].map(|model| Weights::embedded(model).unwrap());
+    let readings = seen(&cross(), 1.0, 0.02, 0);
+    for (device, omp) in devices() {
+        let images = DeviceImages::upload(&omp, &readings, fusion::SIDE * fusion::SIDE).unwrap();
+        let [fsrcnn, estimator, bridge] = &weights;
+        let engine = device.engine().unwrap();
+        let mut chain =
+            crate::gpu::Chain::new(&device, &engine, [fsrcnn, estimator, bridge]).unwrap();
+        chain.limits.shared_bytes = 16 << 10;
+        let small = DeviceEnhancer { chain: Box::new(chain), ..on(&device) };
+        let enhance = |by: &DeviceEnhancer| {
+            by.enhance(&images, 1.0, None, &Options::default(), &mut |_| {}).unwrap()
+        };
+        let theirs = enhance(&on(&device));
+        let _ = device.notes();
+        let ours = enhance(&small);
+        assert!(apart(&ours.images, &theirs.images) < 2e-4);
+        assert!(apart(&ours.inconsistency, &theirs.inconsistency) < 1e-3);
+        let notes = device.notes();
+        let [note] = &notes[..] else { panic!("{notes:?}") };
+        let note = note.to_string();
+        assert!(note.ends_with("the CPU computes the agreement with the readings"), "{note}");
+    }
+}
+
+#[test]
+fn a_reading_that_is_not_a_number_stays_none() {
+    for (device, _) in devices() {
+        // What `DeviceImages::upload` refuses, a kernel of OMP could still leave on the device.
+        let engine = device.engine().unwrap();
+        let mut readings = vec![0.5; 2 * 1024];
+        readings[1024 + 7] = f32::NAN;
+        let there = engine.upload(&readings);
+        let part = engine.readings(&there, 0, 1.0, 2048);
+        let back = engine.read(&[&part]).unwrap();
+        assert!(back[0].floats()[1024 + 7].is_nan());
+        assert_eq!(back[0].floats()[..1024], readings[..1024]);
+    }
+}
+
+#[test]
 fn what_cannot_be_enhanced_there_is_refused() {
     let weights = Weights::embedded("fsrcnn").unwrap();
     let on_cpu = DeviceEnhancer::new(&Device::cpu(), &weights, &weights, &weights);

@@ -85,7 +85,8 @@ fn images_agree_as_on_the_processor() {
         for ((rows, measured), binding) in
             measured.iter().flat_map(|rows| [(rows, true), (rows, false)])
         {
-            let law = agreement(on, measured, binding, KnownEstimate::default()).unwrap();
+            let law =
+                agreement(on, &on.limits(), measured, binding, KnownEstimate::default()).unwrap();
             let made = on.agree(&law, &readings, &guesses, &outputs, cases.len());
             let (images, ratios) = (read(on, &made.images), read(on, &made.ratios));
             let each = images.chunks_exact(AREA).zip(ratios).zip(&cases);
@@ -124,11 +125,29 @@ fn what_the_caller_knows_is_used_in_place_of_the_estimate() {
         let on = engine.as_ref();
         let [readings, guess] = [&case.readings, &case.guess].map(|numbers| on.upload(numbers));
         let image = |outputs: [f32; 2], known| {
-            let law = agreement(on, &MeasuredRows::All, true, known).unwrap();
+            let law = agreement(on, &on.limits(), &MeasuredRows::All, true, known).unwrap();
             let made = on.agree(&law, &readings, &guess, &on.upload(&outputs), 1);
             read(on, &made.images)
         };
         let told = image([0.25, 0.3], KnownEstimate::default());
         assert_close(&image([0.9, 0.001], known), &told, &format!("{backend}"));
+    }
+}
+
+#[test]
+fn a_guess_with_nan_is_told_although_its_image_hides_it() {
+    let case = case("NaN", (1.0, 0.02), (0.02, 0.3), 3);
+    for (backend, engine) in engines() {
+        let on = engine.as_ref();
+        let mut guesses = [case.guess.clone(), case.guess.clone()].concat();
+        guesses[AREA + 77] = f32::NAN;
+        let [readings, guesses] = [&[&case.readings[..], &case.readings].concat(), &guesses]
+            .map(|numbers| on.upload(numbers));
+        let known = KnownEstimate::default();
+        let law = agreement(on, &on.limits(), &MeasuredRows::All, true, known).unwrap();
+        let outputs = on.upload(&[0.125, 0.2, 0.125, 0.2]);
+        let made = on.agree(&law, &readings, &guesses, &outputs, 2);
+        let ratios = read(on, &made.ratios);
+        assert!(ratios[0].is_finite() && ratios[1].is_nan(), "{backend}: {ratios:?}");
     }
 }
