@@ -240,3 +240,48 @@ fn the_whole_of_the_pipeline_is_timed_and_reconstructs_what_was_measured() {
     // Images that stay on the device are those that come to the host and go back.
     assert!(on_gpu["largest_difference"].as_f64().unwrap() < 1e-3, "{on_gpu}");
 }
+
+#[test]
+fn a_gpu_enhances_as_the_processor_and_says_what_it_does_in_another_way() {
+    let bench = Bench::new();
+    bench.write("in.npy", &npy::encode(&[3, 32, 32], &[bar(32), bar(32), bar(32)].concat()));
+    let enhance = |backend, out, more: &[&str]| {
+        let usual = ["enhance", "in.npy", "--out", out, "--backend", backend];
+        bench.run(&[&usual[..], more].concat())
+    };
+    enhance("cpu", "cpu.npy", &[]).succeeded();
+    let on_gpu = enhance("wgpu", "gpu.npy", &[]);
+    if on_gpu.code != Some(0) {
+        on_gpu.failed(1, &["backend wgpu"]);
+        eprintln!("skipped: no wgpu on this machine");
+        return;
+    }
+    on_gpu.succeeded();
+    let read = |file| npy::read_stack(&bench.path(file)).unwrap().values;
+    let cpu = read("cpu.npy");
+    let apart = |other: &[f32]| {
+        let apart = cpu.iter().zip(other).map(|(a, b)| (a - b).abs());
+        // NaN counts as the largest difference.
+        apart.fold(0.0, |most, v| if v <= most { most } else { v })
+    };
+    assert!(apart(&read("gpu.npy")) < 1e-3, "{}", apart(&read("gpu.npy")));
+    let half = enhance("wgpu", "half.npy", &["--precision", "f16"]);
+    let said = "precision f16 needs a GPU with tensor cores, through CUDA; ";
+    assert!(half.code == Some(0) && half.stderr.contains(said), "{half:?}");
+    assert!(apart(&read("half.npy")) < 1e-3);
+}
+
+#[test]
+fn a_precision_that_does_not_exist_is_refused_and_the_processor_has_one_alone() {
+    let bench = Bench::new();
+    bench.write("in.npy", &npy::encode(&[32, 32], &bar(32)));
+    let enhance = |precision| {
+        let usual = ["enhance", "in.npy", "--out", "out.npy", "--backend", "cpu"];
+        bench.run(&[&usual[..], &["--precision", precision]].concat())
+    };
+    enhance("f32").succeeded();
+    let half = enhance("f16");
+    let said = "precision f16 needs a GPU with tensor cores, through CUDA; CPU computes in f32";
+    assert!(half.code == Some(0) && half.stderr.contains(said), "{half:?}");
+    enhance("bf16").failed(2, &["precision \"bf16\", expected f32 or f16"]);
+}
