@@ -42,6 +42,7 @@ by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
+    "cuda            tests of GPU kernels through CUDA, whose PTX runs on the processor; PyPI, 300 MB"
     "cuda-source     every GPU kernel compiles for NVIDIA's GPUs and keeps to its registers, without a GPU; PyPI, 300 MB"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
@@ -125,7 +126,8 @@ step_gpu() {
     software_vulkan
     # The packages that have such tests: their features are other than in step `test`, so each one is built again.
     cargo test --locked -p nirspi-gpu -p nirspi-recon -p nirspi-nets -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
-        omp:: gpu:: pursuit:: network:: sparse_problems:: the_whole_of_the_pipeline weights:: --nocapture 2>&1 | tee target/gpu-tests.log
+        omp:: gpu:: pursuit:: network:: agreement:: cache:: enhance::device sparse_problems:: a_gpu_enhances \
+        the_whole_of_the_pipeline weights:: --nocapture 2>&1 | tee target/gpu-tests.log
     if ls /usr/share/vulkan/icd.d/lvp_icd.* >/dev/null 2>&1 && grep -q '^skipped: .*wgpu' target/gpu-tests.log; then
         echo "software Vulkan is there, and its tests were skipped" >&2
         return 1
@@ -436,6 +438,12 @@ step_mutations() {
 # One fault after another in a copy of the tree, each against the tests of its own crate: docs/mutants.md. Crates in
 # MUTANTS are tried whole; without it, lines that differ from MUTANTS_SINCE (default: main). MUTANTS_SHARD=0/8 tries an
 # eighth of the faults. The exit status is that of cargo-mutants: 2 if a fault was missed.
+step_cuda() {
+    cargo clippy --locked -p nirspi-tests-cuda --all-targets -- -D warnings
+    cargo test --locked -p nirspi-tests-cuda --lib
+    python3 tests/cuda/check.py
+}
+
 step_cuda_source() {
     # A feature that no other step has.
     cargo clippy --locked -p nirspi-nets --features source --lib --example cuda_source -- -D warnings
