@@ -22,6 +22,9 @@ use cubecl::prelude::*;
 use kernels::{SIDE, Shape, UNITS};
 use layout::{FINE, SETTINGS, TABLES};
 
+/// In place of the inconsistency of a frame whose guess has NaN. No inconsistency is negative.
+pub const BROKEN: f32 = -1.0;
+
 /// Number of buffers of the kernel.
 const BUFFERS: usize = 8;
 
@@ -85,7 +88,8 @@ pub struct Agreement {
 pub struct Agreed {
     /// frames x 64 x 64, in [0, 1].
     pub images: Buffer,
-    /// The inconsistency of each frame; NaN for a frame whose guess has NaN, which its image hides.
+    /// The inconsistency of each frame; [`BROKEN`] for a frame whose guess has NaN, which its image
+    /// hides.
     pub ratios: Buffer,
 }
 

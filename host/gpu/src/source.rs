@@ -258,6 +258,7 @@ mod tests {
             values: engine.empty(2),
             state: engine.empty(crate::pursuit::layout::STATE),
             coefficients: engine.empty(1),
+            exact: None,
         };
         engine.coefficients(&pursuit);
         let refused = written(card).unwrap_err();

@@ -15,6 +15,7 @@
 // arguments.
 #![allow(clippy::too_many_arguments)]
 
+use super::BROKEN;
 use super::layout::{COSINES, COSINES_ACROSS, FINE, MASK, SETTINGS, WALSH, WALSH_ACROSS, WAVES};
 use cubecl::prelude::*;
 use std::f32::consts::PI;
@@ -548,7 +549,7 @@ pub(super) fn agree(
     if unit == 0 {
         let mut ratio = left / expected;
         if broken > 0.0f32 {
-            ratio = f32::reinterpret(0x7fc0_0000u32);
+            ratio = comptime!(BROKEN);
         }
         ratios[frame] = ratio;
     }

@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 use nirspi_gpu::GpuError;
+use nirspi_gpu::agreement::BROKEN;
 use nirspi_recon::omp::OmpError;
 use nirspi_recon::omp::gpu::{self, DeviceImages};
 use rayon::prelude::*;
@@ -196,7 +197,7 @@ fn finished(
         constraint.correct(&mut images);
         inconsistency = constraint.residual_ratios(&images);
     }
-    if let Some(at) = inconsistency.iter().position(|ratio| ratio.is_nan()) {
+    if let Some(at) = inconsistency.iter().position(|&ratio| ratio.is_nan() || ratio == BROKEN) {
         return Err(DeviceEnhancerError::NotANumber { image: first + at });
     }
     Ok(Enhanced {
