@@ -11,7 +11,7 @@
 //! of this crate, the GPU's compute capability and NVRTC's version
 //! (`tests::another_version_or_gpu_has_another_folder`). CubeCL adds its own version.
 //!
-//! CubeCL panics if it cannot write to the folder, so [`enable`] tries that first. If it fails, kernels
+//! CubeCL panics if it cannot write to the folder, so `enable` tries that first. If it fails, kernels
 //! are compiled in each run, and [`trouble`] says why.
 
 use cubecl::config::cache::CacheConfig;

@@ -105,7 +105,7 @@ impl Gpu {
 }
 
 /// The first GPU that CUDA can use. The first call has CubeCL keep compiled kernels
-/// ([`cache`](crate::cache)).
+/// ([`cache`]).
 ///
 /// # Errors
 /// [`Absent`] if the driver, the run-time compiler, its headers, or a GPU is missing.
