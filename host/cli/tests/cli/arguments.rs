@@ -95,8 +95,8 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["bench", "enhance", "--frames", "0"], &["--frames", "'0'"]),
         // As many frames would take more memory than there is.
         (&["bench", "omp", "--frames", "4294967295"], &["--frames", "1..=65536"]),
-        (&["bench", "enhance", "--frames", "4294967295"], &["--frames", "1..=65536"]),
-        (&["bench", "pipeline", "--frames", "4294967295"], &["--frames", "1..=65536"]),
+        (&["bench", "enhance", "--frames", "4294967295"], &["--frames", "1..=131072"]),
+        (&["bench", "pipeline", "--frames", "4294967295"], &["--frames", "1..=131072"]),
         (&["bench", "pipeline", "--sparsity", "600"], &["--sparsity is 600", "1 to 512"]),
         (&["reconstruct", "in.npz", "--matrix", "p.npy", "--enhance"], &["--matrix", "--enhance"]),
         (&["eval", "sampling", "in.npz", "--sampling", "0.1,200"], &["'200'", "--sampling"]),
