@@ -3,7 +3,9 @@
 //! | module | contents |
 //! |---|---|
 //! | [`plan`] | distribution of a convolution to workgroups within a device's limits: pure functions |
-//! | `kernels` | the kernels |
+//! | `kernels` | the kernels for every GPU |
+//! | [`tiles`], `tensor` | the convolution by products of small matrices, for tensor cores |
+//! | `finish` | what both kernels of a convolution do before they store the output |
 //!
 //! # How
 //! Activations are `frame x row x column x channel`. Nearly all work is in one kernel, `convolve`:

@@ -2,7 +2,9 @@
 //!
 //! # Invariant
 //! A GPU gives the processor's results to within 1e-4
-//! (`network::tests::every_device_of_this_machine_gives_what_pytorch_gives`).
+//! (`network::tests::every_device_of_this_machine_gives_what_pytorch_gives`), and to within 5e-3 in
+//! [`Arithmetic::F16`](crate::Arithmetic::F16)
+//! (`tests::products::the_unet_by_products_is_the_unet_in_both_precisions`).
 //!
 //! | module | contents |
 //! |---|---|
