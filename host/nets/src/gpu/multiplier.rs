@@ -25,6 +25,9 @@ pub(crate) struct Multiplier {
     /// Becomes 1 as soon as an activation is not a number of `f16`.
     beyond: Buffer,
     notes: Notes,
+    /// Factor on the weights of products: a fault, for tests.
+    #[cfg(test)]
+    pub(super) fault: f32,
 }
 
 impl Multiplier {
@@ -36,7 +39,14 @@ impl Multiplier {
         arithmetic: Arithmetic,
         notes: Notes,
     ) -> Self {
-        Self { product, arithmetic, beyond: engine.upload(&[0.0]), notes }
+        Self {
+            product,
+            arithmetic,
+            beyond: engine.upload(&[0.0]),
+            notes,
+            #[cfg(test)]
+            fault: 1.0,
+        }
     }
 
     /// Tells the user.
@@ -74,6 +84,8 @@ impl Multiplier {
         match columns {
             Some(columns) if filter.weights.iter().copied().all(numbers) => {
                 let packed = pack::products(filter, columns, order);
+                #[cfg(test)]
+                let packed: Vec<f32> = packed.iter().map(|weight| weight * self.fault).collect();
                 layer.with_products(Products {
                     product: self.product,
                     planes,

@@ -253,6 +253,29 @@ fn a_number_beyond_f16_is_computed_without_tensor_cores_and_the_user_is_told() {
 }
 
 #[test]
+fn tensor_cores_that_fail_the_comparison_are_not_used_and_the_user_is_told() {
+    let told = [1.0, 1.0, 0.5, 0.25, 0.1, 0.01];
+    let [sharp, soft] = scene();
+    let weights = Weights::embedded("diffusion").unwrap();
+    for (backend, engine) in engines() {
+        let Some(product) = product_of(engine.as_ref()) else { continue };
+        let (plain, _) = unet(&engine, None);
+        let expected = plain.run(64, &sharp, &soft, &[told]);
+        for (fault, note) in [(1.0, None), (1.01, Some(Note::TensorCoresDiffer))] {
+            let notes = Notes::default();
+            let on = engine.as_ref();
+            let mut multiplier = Multiplier::new(on, product, Arithmetic::F32, notes.clone());
+            multiplier.fault = fault;
+            let unet = UNet::new(&engine, &weights, Some(multiplier)).unwrap().compared();
+            assert_eq!(notes.take(), note.into_iter().collect::<Vec<_>>(), "{backend}: {fault}");
+            if fault > 1.0 {
+                assert_eq!(unet.run(64, &sharp, &soft, &[told]), expected, "{backend}");
+            }
+        }
+    }
+}
+
+#[test]
 fn weights_that_are_not_exact_in_f16_are_not_rounded_in_single_precision() {
     let Some((_, engine)) = engines().into_iter().next() else { return };
     let on = engine.as_ref();
