@@ -21,7 +21,7 @@ pub struct NetworkArgs {
     #[arg(long, value_name = "BACKEND", default_value_t)]
     backend: Backend,
     /// Arithmetic of the deblurring network on a GPU with tensor cores: f32 gives what the processor gives to within 0.0001;
-    /// f16 takes about half the time there and differs by 0.005 at most. Other devices always compute in f32
+    /// f16 needs half of the multiplications there and differs by 0.005 at most. Other devices always compute in f32
     #[arg(long, value_name = "NUMBERS", default_value_t)]
     precision: Arithmetic,
 }

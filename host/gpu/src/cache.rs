@@ -54,8 +54,8 @@ impl fmt::Display for Compiled {
 
 static TROUBLE: Mutex<Option<String>> = Mutex::new(None);
 
-/// Why compiled kernels are not kept although nobody has asked for that; one line, which is given
-/// once.
+/// Why compiled kernels cannot be kept, in one line; `None` if they are, if the user turned that off,
+/// or after the first call.
 #[must_use]
 pub fn trouble() -> Option<String> {
     TROUBLE.lock().unwrap_or_else(PoisonError::into_inner).take()
@@ -139,8 +139,8 @@ fn writable(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes the folders of other builds that nobody has used for a long time. What cannot be removed
-/// stays.
+/// Removes the folders of other builds whose last use is longer ago than [`KEPT`]. A folder that
+/// cannot be removed stays.
 fn clear(parent: &Path, now: SystemTime) {
     let Ok(entries) = fs::read_dir(parent) else { return };
     for path in entries.filter_map(|entry| Some(entry.ok()?.path())) {
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_of_other_builds_go_when_nobody_uses_them_any_more() {
+    fn folders_of_other_builds_are_removed_after_a_time_without_use() {
         let parent = empty("old");
         for name in ["0.0.1-0-sm_90-nvrtc13.0", "mine"] {
             fs::create_dir_all(parent.join(name).join("cuda")).unwrap();

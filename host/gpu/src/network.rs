@@ -117,6 +117,9 @@ impl Layer {
     }
 }
 
+/// Largest number of `f16`.
+pub const LARGEST_F16: f32 = 65_504.0;
+
 /// Whether a number is one of `f16`, so that rounding to it changes nothing.
 #[must_use]
 pub fn is_f16(number: f32) -> bool {

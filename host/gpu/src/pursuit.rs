@@ -5,7 +5,7 @@
 //! | [`layout`] | the order of a pursuit's numbers in memory, which kernels and host share |
 //! | `budget` | distribution of a pursuit to workgroups and launches within a device's limits |
 //! | `kernels` | the kernels |
-//! | `referee` | choices in double precision |
+//! | [`referee`] | choices in double precision |
 //!
 //! # How
 //! One workgroup pursues one frame, with its projections in registers: four atoms a unit for 1024
@@ -20,7 +20,7 @@
 mod budget;
 mod kernels;
 pub mod layout;
-mod referee;
+pub mod referee;
 
 use crate::Buffer;
 use crate::engine::{Engine, upload_doubles};

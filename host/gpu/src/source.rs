@@ -5,7 +5,7 @@
 //! run on it as on a GPU, with zeros for results, and [`written`] then gives each kernel that a GPU
 //! of this kind would have been given. `host/gpu/scripts/cuda_source.py` compiles them.
 //!
-//! Nobody lists the kernels. A new kernel, or a new variant of one, is written as soon as the
+//! There is no list of kernels. A new kernel, or a new variant of one, is written as soon as the
 //! networks or the pursuit launch it.
 
 mod server;

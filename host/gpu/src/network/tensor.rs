@@ -13,8 +13,9 @@
 // arguments.
 #![allow(clippy::too_many_arguments)]
 
+use super::LARGEST_F16;
 use super::finish::{Ending, store};
-use super::tiles::{CHANNELS, PIXELS, STEP, Tiles, WARP};
+use super::tiles::{CHANNELS, PIXELS, STEP, Tiles, WARP, place};
 use cubecl::cmma::MmaDefinition;
 use cubecl::ir::MatrixIdent;
 use cubecl::ir::features::{Features, MmaConfig};
@@ -68,17 +69,8 @@ pub(super) struct Shape {
     pub ending: Ending,
 }
 
-/// Largest number of `f16`. A larger activation, or NaN, is reported.
-const LARGEST: f32 = 65_504.0;
-
 /// The place of an input pixel in `from` that lies outside the image.
 const OUTSIDE: u32 = u32::MAX;
-
-/// The place of half `half` of row `row` ([`super::tiles::half_at`]).
-#[cube]
-fn half_at(row: usize, half: usize) -> usize {
-    2 * row + (half ^ ((row >> 2) & 1))
-}
 
 /// The inner product of eight numbers of a row of pixels and of a row of weights, where both rows
 /// begin at these vectors.
@@ -237,7 +229,7 @@ pub(super) fn convolve<N: Size>(
                         for k in 0..4usize {
                             let x = four[k];
                             // A comparison with NaN is false.
-                            within_f16 = within_f16 && f32::abs(x) <= LARGEST;
+                            within_f16 = within_f16 && f32::abs(x) <= LARGEST_F16;
                             let near = f16::cast_from(x);
                             high[4 * v + k] = near;
                             if comptime!(planes == 2) {
@@ -248,7 +240,7 @@ pub(super) fn convolve<N: Size>(
                 }
                 let pixel = item / of_row;
                 let part = item % of_row;
-                let to = half_at(pixel, part / of_half) * of_half + part % of_half;
+                let to = place(pixel, part / of_half) * of_half + part % of_half;
                 seen[to] = high;
                 if comptime!(planes == 2) {
                     seen[comptime!(staged * of_row) + to] = low;
@@ -311,7 +303,7 @@ pub(super) fn convolve<N: Size>(
             let within = pixel % comptime!(rows * out_side);
             let frame = first_frame + pixel / comptime!(rows * out_side);
             if frame < frames {
-                let place = frame * comptime!(out_side * out_side) + first_row * out_side + within;
+                let output = frame * comptime!(out_side * out_side) + first_row * out_side + within;
                 #[unroll]
                 for j in 0..across {
                     let two = sums.index(i * across + j)[part];
@@ -322,7 +314,7 @@ pub(super) fn convolve<N: Size>(
                     for k in 0..2usize {
                         store(
                             two[k],
-                            place,
+                            output,
                             channel + k,
                             outputs,
                             out_side,
@@ -366,7 +358,7 @@ fn multiply<N: Size>(
     #[unroll]
     for pair in 0..comptime!(tiles.columns.across / 2) {
         let channel = (warp_across * across + 2 * pair) * CHANNELS + lane / 16 * 8 + lane % 8;
-        let at = half_at(tap_rows + channel, lane / 8 % 2) * of_half;
+        let at = place(tap_rows + channel, lane / 8 % 2) * of_half;
         let four = products.load_matrix::<Vector<f16, N>, Const<2>>(
             &kernel.slice(at, at + of_half),
             MatrixIdent::B,
@@ -387,7 +379,7 @@ fn multiply<N: Size>(
         for i in 0..comptime!(tiles.down) {
             // The first two matrices are the first halves of 16 pixels, then come the second ones.
             let at =
-                (half_at(pixels[i] + shift, lane / 16) + comptime!(2 * staged) * plane) * of_half;
+                (place(pixels[i] + shift, lane / 16) + comptime!(2 * staged) * plane) * of_half;
             let line = products.load_matrix::<Vector<f16, N>, Const<2>>(
                 &seen.slice(at, at + of_half),
                 MatrixIdent::A,
@@ -432,14 +424,14 @@ fn imitate<N: Size>(
                     + within / comptime!(tiles.out_side) * comptime!(tiles.stride);
                 let first =
                     row * columns + within % comptime!(tiles.out_side) * comptime!(tiles.stride);
-                let at = (half_at(first + shift, half % 2) + plane) * of_half;
+                let at = (place(first + shift, half % 2) + plane) * of_half;
                 #[unroll]
                 for j in 0..across {
                     let mut two = Vector::<f32, Const<2>>::empty();
                     let before = sums.index(i * across + j)[part];
                     for k in 0..2usize {
                         let channel = (warp_across * across + j) * CHANNELS + lane % 4 * 2 + k;
-                        let weight = half_at(tap_rows + channel, half % 2) * of_half;
+                        let weight = place(tap_rows + channel, half % 2) * of_half;
                         two[k] = before[k] + eight::<N>(seen, kernel, at, weight);
                     }
                     sums.index_mut(i * across + j)[part] = two;

@@ -17,6 +17,7 @@
 
 use super::plan::Geometry;
 use crate::limits::{DeviceLimits, GROUPS};
+use cubecl::prelude::*;
 
 /// Number of input channels in one step through shared memory, and of a product of matrices.
 pub const STEP: usize = 16;
@@ -75,7 +76,13 @@ impl Columns {
 /// eight numbers. Rows are pixels, or output channels in the weights of a tap.
 #[must_use]
 pub fn half_at(row: usize, half: usize) -> usize {
-    2 * row + (half ^ (row >> 2 & 1))
+    place(row, half)
+}
+
+/// [`half_at`], for kernels too.
+#[cube]
+pub(super) fn place(row: usize, half: usize) -> usize {
+    2 * row + (half ^ ((row >> 2) & 1))
 }
 
 /// A convolution for images of one size, as its kernel is compiled for it.

@@ -1,6 +1,7 @@
 //! Distributes pursuits to workgroups and launches within the limits of a device.
 
 use super::layout::{Shape, TOGETHER};
+use super::referee::STEPS;
 use crate::GpuError;
 use crate::limits::{BUFFER_BYTES, DeviceLimits, GROUPS, ROUNDS, check};
 
@@ -87,12 +88,12 @@ impl Shape {
 
 impl Shape {
     /// Number of rounds that the referee of step `k` takes at most: to substitute back, to refine
-    /// five times, and to score the rivals.
+    /// [`STEPS`] times, and to score the rivals.
     fn referee_rounds(&self, k: usize) -> usize {
         let own = k.div_ceil(self.units);
         let substitution = k + k * own;
         let refinement = own * (k + 2) + 2 * substitution;
-        2 * own + substitution + 5 * refinement + self.per_unit * k
+        2 * own + substitution + STEPS * refinement + self.per_unit * k
     }
 }
 

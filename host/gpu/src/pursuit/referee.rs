@@ -15,11 +15,11 @@ use super::layout::Shape;
 use cubecl::prelude::*;
 
 /// Change of the coefficients, relative to the largest, below which a further step would only add
-/// rounding (`omp::referee::REFINED`).
-const REFINED: f32 = 1e-11;
+/// rounding. `nirspi-recon` holds it against its own.
+pub const REFINED: f64 = 1e-11;
 
-/// Largest number of refinement steps (`omp::referee::STEPS`).
-const STEPS: u32 = 5;
+/// Largest number of refinement steps. `nirspi-recon` holds it against its own.
+pub const STEPS: usize = 5;
 
 /// The largest of one number of each unit; every unit gets it.
 #[cube]
@@ -174,7 +174,7 @@ pub(super) fn decide<D: Float>(
         let change = largest(change, numbers, units);
         let size = largest(size, numbers, units);
         step += 1;
-        more = step < STEPS && change > REFINED * size;
+        more = step < comptime!(STEPS as u32) && change > comptime!(REFINED as f32) * size;
     }
 
     let mut best = D::cast_from(-1.0f32);

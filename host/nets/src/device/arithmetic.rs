@@ -13,7 +13,8 @@ pub enum Arithmetic {
     #[default]
     F32,
     /// Operands in half precision and sums in single precision, by the tensor cores of a GPU: within
-    /// 5e-3 of full scale, 2e-4 root mean square, at half the work of [`F32`](Self::F32) there.
+    /// 5e-3 of full scale, 2e-4 root mean square, with half of the products of
+    /// [`F32`](Self::F32) there.
     F16,
 }
 

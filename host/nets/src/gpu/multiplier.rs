@@ -7,15 +7,12 @@
 //! (`tests::the_unet_by_products_is_the_unet_in_both_precisions`).
 
 use nirspi_gpu::network::tiles::Columns;
-use nirspi_gpu::network::{Layer, Product, Products};
+use nirspi_gpu::network::{LARGEST_F16, Layer, Product, Products};
 use nirspi_gpu::{Buffer, Kernels};
 
 use super::pack::{self, Order};
 use crate::device::{Arithmetic, Note, Notes};
 use crate::filter::Filter;
-
-/// Largest number of `f16`.
-const LARGEST: f32 = 65_504.0;
 
 /// How convolutions multiply on a device with tensor cores.
 #[derive(Debug, Clone)]
@@ -78,7 +75,7 @@ impl Multiplier {
     ) -> Layer {
         let (planes, numbers): (usize, fn(f32) -> bool) = match self.arithmetic {
             Arithmetic::F32 => (2, nirspi_gpu::network::is_f16),
-            Arithmetic::F16 => (1, |weight| weight.abs() <= LARGEST),
+            Arithmetic::F16 => (1, |weight| weight.abs() <= LARGEST_F16),
         };
         let columns = Columns::of(filter.outputs).filter(|_| filter.inputs.is_multiple_of(8));
         match columns {

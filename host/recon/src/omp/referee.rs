@@ -59,11 +59,11 @@ pub(super) const BELIEVED_ENERGY: f64 = 64.0 * f32::EPSILON as f64;
 
 /// Change of the coefficients, relative to the largest, below which a further step would only add
 /// rounding.
-const REFINED: f64 = 1e-11;
+pub(super) const REFINED: f64 = 1e-11;
 
 /// Largest number of refinement steps. A Gram matrix that needs more steps has ended the pursuit in
 /// `f32` before.
-const STEPS: usize = 5;
+pub(super) const STEPS: usize = 5;
 
 /// The same measurement and dictionary in double precision.
 pub(super) struct DoubleReferee<'a> {

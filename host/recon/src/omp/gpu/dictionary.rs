@@ -16,13 +16,13 @@ use super::gram::{DeviceGram, DeviceSolutions, FRAMES_A_THREAD, width};
 use super::images::DeviceImages;
 use crate::omp::dictionary::Atoms;
 use crate::omp::pursuit::energy;
-use crate::omp::referee::BELIEVED;
+use crate::omp::referee::{self, BELIEVED};
 use crate::omp::{
     BackendError, Dictionary, Limits, MixedDictionary, OmpError, Path, Scalar, Solution, finite,
 };
 use nalgebra::DMatrix;
-use nirspi_gpu::pursuit::Exact;
 use nirspi_gpu::pursuit::layout::{Shape, TOGETHER};
+use nirspi_gpu::pursuit::{Exact, referee as kernel};
 use nirspi_gpu::{Buffer, limits};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -33,6 +33,9 @@ const TURN: usize = 1024;
 
 /// Number of turns that share the device's memory.
 const AT_A_TIME: usize = 4;
+
+/// The kernel's referee refines as often and as far as the processor's.
+const _: () = assert!(kernel::STEPS == referee::STEPS && kernel::REFINED == referee::REFINED);
 
 /// A `measurements x atoms` matrix with any column norms, on a device.
 #[derive(Debug)]
