@@ -48,7 +48,7 @@ pub struct Args {
     method: MethodArgs,
     /// Patterns of your own instead of Hadamard rows: (M, n * n) weights, one pattern in each row. `y` in the input then has
     /// one reading for each pattern, and --strength is relative to the variance of the readings
-    #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "keep", "residual", "stop_at_noise", "as_printed",
+    #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed",
           "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
     /// With --index all: start each frame from the frames before. omp starts from their atoms, as long as the result explains

@@ -50,7 +50,6 @@ pub(crate) struct Options<'py> {
     strength: Option<f64>,
     as_printed: bool,
     non_negative: bool,
-    keep: Option<String>,
     warm_start: bool,
     device: String,
 }
@@ -128,7 +127,6 @@ impl Options<'_> {
             as_printed: self.as_printed,
             non_negative: self.non_negative,
             strength: self.strength.map_or(default.strength, Strength::Fixed),
-            completion: self.keep.as_ref().map(|keep| keep.parse().map_err(refusal)).transpose()?,
             network: Some(nirspi_nets::prior::shipped()),
             backend: backend(&self.device)?.0,
         })

@@ -13,11 +13,13 @@ use crate::{Order, Rows, RowsError, Side, order};
 use thiserror::Error;
 
 /// Signed measurements `value[k] = sum over pixels of H[row[k], p] * x[p]`, in the order of
-/// measurement. Values are finite. Rows that were not measured, or were left out, are absent.
+/// measurement. Values are finite. Rows that were not measured, or were left out, are absent. The
+/// noise of a value is known if the camera measured it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurements {
     rows: Rows,
     values: Vec<f64>,
+    noise: Option<f64>,
 }
 
 /// What is wrong with a set of measurements. The caller adds the name of the file.
@@ -53,6 +55,12 @@ pub enum MeasurementError {
         /// The share that was requested.
         found: f64,
     },
+    /// The noise of a value is negative.
+    #[error("a noise of {found}, expected a standard deviation of 0 or more")]
+    Noise {
+        /// The noise that was given.
+        found: f64,
+    },
     /// The rows, or the rows of an order, are wrong.
     #[error(transparent)]
     Rows(#[from] RowsError),
@@ -68,7 +76,7 @@ impl Measurements {
     pub fn from_differential(rows: &Rows, d: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("d", d.len(), rows.len())?;
         expect_finite("d", d)?;
-        Ok(Self { rows: rows.clone(), values: d.to_vec() })
+        Ok(Self { rows: rows.clone(), values: d.to_vec(), noise: None })
     }
 
     /// Measurements from raw readings in time order, each pattern followed by its complement:
@@ -102,7 +110,7 @@ impl Measurements {
         expect_finite("d", &values)?; // readings near the end of f64's range may differ by more
         let rows =
             if dropouts.is_empty() { rows.clone() } else { Rows::trusted(rows.side(), kept) };
-        Ok((Self { rows, values }, dropouts))
+        Ok((Self { rows, values, noise: None }, dropouts))
     }
 
     /// Measurements from readings of the positive patterns alone (light where `H` is +1):
@@ -124,7 +132,7 @@ impl Measurements {
         };
         let values: Vec<f64> = y.iter().map(|y| 2.0 * y - all_ones).collect();
         expect_finite("d", &values)?;
-        Ok(Self { rows: rows.clone(), values })
+        Ok(Self { rows: rows.clone(), values, noise: None })
     }
 
     /// Removes the effect of a dark level in every reading (ambient light, an ADC's offset) from
@@ -165,13 +173,36 @@ impl Measurements {
 
     /// Measurements that are known to be one finite value for each row.
     pub(crate) fn trusted(rows: Rows, values: Vec<f64>) -> Self {
-        Self { rows, values }
+        Self { rows, values, noise: None }
     }
 
     /// The measurements at these positions, in that order.
     pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();
-        Self { rows: Rows::trusted(self.side(), rows), values }
+        Self { rows: Rows::trusted(self.side(), rows), values, noise: self.noise }
+    }
+
+    /// These measurements with the standard deviation of the noise of one value, in the values'
+    /// units: what the camera knows from repeated sweeps. The noise is the same for all values. Every
+    /// method weights each reading by it; without it the methods estimate the noise
+    /// ([`estimated_noise`](crate::reconstruct::estimated_noise)).
+    ///
+    /// # Errors
+    /// [`MeasurementError::NotFinite`] for NaN or infinity; [`MeasurementError::Noise`] below 0.
+    pub fn with_noise(mut self, noise: f64) -> Result<Self, MeasurementError> {
+        expect_finite("noise", &[noise])?;
+        if noise < 0.0 {
+            return Err(MeasurementError::Noise { found: noise });
+        }
+        self.noise = Some(noise);
+        Ok(self)
+    }
+
+    /// Standard deviation of the noise of one value, in the values' units, if it was
+    /// [measured](Self::with_noise).
+    #[must_use]
+    pub fn noise(&self) -> Option<f64> {
+        self.noise
     }
 
     /// Side of the image that was measured.

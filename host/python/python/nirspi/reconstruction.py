@@ -56,7 +56,6 @@ def reconstruct(
     strength: float | None = None,
     as_printed: bool = False,
     non_negative: bool = False,
-    keep: str | None = None,
     warm_start: bool = False,
     matrix: Any = None,
     n: int | None = None,
@@ -96,8 +95,6 @@ def reconstruct(
         OMP: Algorithm 1 as printed in the paper.
     non_negative : bool
         OMP: no negative light; needs the pixel basis or a dictionary.
-    keep : {"measured", "sparse"}, optional
-        Whether measured coefficients stay or take the values of the fit.
     warm_start : bool
         Start each measurement from those before it; not for ``hadamard`` and ``pseudo-inverse``.
     matrix : array_like, (M, n * n), optional
@@ -136,7 +133,6 @@ def reconstruct(
         strength=strength,
         as_printed=as_printed,
         non_negative=non_negative,
-        keep=keep,
         warm_start=warm_start,
         device=device,
     )
@@ -194,7 +190,6 @@ def method_options(
     strength: float | None = None,
     as_printed: bool = False,
     non_negative: bool = False,
-    keep: str | None = None,
     warm_start: bool = False,
     device: str = "auto",
 ) -> dict[str, Any]:
@@ -211,7 +206,6 @@ def method_options(
         "strength": None if strength is None else float(strength),
         "as_printed": bool(as_printed),
         "non_negative": bool(non_negative),
-        "keep": keep,
         "warm_start": bool(warm_start),
         "device": str(device),
     }
@@ -261,8 +255,8 @@ def _by_matrix(readings: Any, matrix: Any, n: int | None, dictionary: Any, optio
     y = readings.d if isinstance(readings, Measurement) else _arrays.real(readings, "y")
     if y.ndim < 1 or y.shape[-1] != weights.shape[0]:
         raise Error(f"y has shape {y.shape}, expected (..., {weights.shape[0]}): one a pattern")
-    if options["warm_start"] or options["order"] is not None or options["keep"] is not None:
-        raise Error("warm_start, order and keep belong to Hadamard rows, not to a matrix")
+    if options["warm_start"] or options["order"] is not None:
+        raise Error("warm_start and order belong to Hadamard rows, not to a matrix")
     if dictionary is not None:
         options["dictionary"] = _atoms(dictionary, n)
     pixels, reports = _nirspi.reconstruct_matrix(

@@ -11,9 +11,7 @@
 
 use super::prior::SharedNetwork;
 use super::report::{Reconstruction, Report};
-use super::{
-    Completion, MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength, methods,
-};
+use super::{MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength, methods};
 use crate::{Backend, Basis, Measurements};
 use std::fmt;
 use std::str::FromStr;
@@ -65,6 +63,19 @@ pub trait Reconstruct: Send + Sync {
         let made = self.reconstruct(measurements)?;
         pixels.copy_from_slice(made.image.pixels());
         Ok(made.report)
+    }
+
+    /// For a method that chooses among others: the choice for measurements like `first`, for a stack
+    /// of such measurements, which it would be slow to judge one by one. `None`: every other method
+    /// is its own choice.
+    ///
+    /// # Errors
+    /// As [`Reconstruct::reconstruct`].
+    fn settled(
+        &self,
+        _first: &Measurements,
+    ) -> Result<Option<Arc<dyn Reconstruct>>, ReconstructError> {
+        Ok(None)
     }
 
     /// What the frames of a video have shown before the first frame, for
@@ -139,7 +150,10 @@ impl Method {
     /// Orthogonal matching pursuit, the paper's method.
     pub const OMP: Self = methods::OMP;
 
-    /// Tikhonov's method, the default: `docs/reconstruction.md` has the comparison.
+    /// The method that held-back readings choose, the default.
+    pub const AUTO: Self = methods::AUTO;
+
+    /// Tikhonov's method, with a covariance prior.
     pub const TIKHONOV: Self = methods::TIKHONOV;
 
     /// The learned prior, which needs [`MethodSettings::network`].
@@ -205,7 +219,7 @@ impl Method {
 
 impl Default for Method {
     fn default() -> Self {
-        Self::TIKHONOV
+        Self::AUTO
     }
 }
 
@@ -312,11 +326,6 @@ pub struct MethodSettings {
     pub non_negative: bool,
     /// How strong a penalty is.
     pub strength: Strength,
-    /// Whether measured rows keep their values or take those of the fit. `None` means
-    /// [`Completion::Measured`], except for Algorithm 1 as printed and for non-negative
-    /// coefficients: there `None` means [`Completion::Sparse`], because noise of the measured rows
-    /// would make pixels negative.
-    pub completion: Option<Completion>,
     /// The backend.
     pub backend: Backend,
     /// The learned prior's network. Other methods ignore it. `nirspi_nets::prior::shipped` is the
@@ -335,7 +344,6 @@ impl Default for MethodSettings {
             as_printed: false,
             non_negative: false,
             strength: Strength::default(),
-            completion: None,
             backend,
             network: None,
         }
@@ -401,14 +409,6 @@ impl MethodSettings {
             }
         }
         taken
-    }
-
-    /// Whether measured rows keep their values or take those of the fit.
-    #[must_use]
-    pub fn completion(&self) -> Completion {
-        let sparse = self.as_printed || self.non_negative;
-        let default = if sparse { Completion::Sparse } else { Completion::Measured };
-        self.completion.unwrap_or(default)
     }
 }
 

@@ -5,15 +5,15 @@
 //!    Tikhonov's image at strength 1.
 //! 2. The network gives every coefficient. This crate has no network of its own: `nirspi-nets` has
 //!    the shipped one, and [`Network`] is the interface for others.
-//! 3. A measured coefficient keeps the network's value only within [`WITHIN`] times the noise that
-//!    is estimated from the measurements.
+//! 3. A measured coefficient is the weighted mean of its reading and of what the network says without
+//!    it, within [`WITHIN`](super::WITHIN) times the reading's noise. Without noise it is the reading.
 //! 4. The network completes the measurements a second time without every other row of their finest
 //!    quarter. The share of the way from the start to the network's image that predicts these rows
 //!    best, plus one standard error, is the trust: 0 is the start, 1 the network's image.
 //!
 //! # Invariant
 //! Whatever the network gives, a measured coefficient of the image differs from its measurement by
-//! at most [`WITHIN`] times the noise (`tests::measured_values_stay_within_their_noise`), gain and
+//! at most [`WITHIN`](super::WITHIN) times the noise (`tests::measured_values_stay_within_their_noise`), gain and
 //! offset of the measurements are those of the image (`tests::gain_and_offset_go_through`), and
 //! measurements that the network cannot take give Tikhonov's image and a line that says so
 //! (`tests::what_the_network_cannot_take_is_tikhonov_and_says_so`).
@@ -24,21 +24,21 @@ pub use seen::Seen;
 
 use super::selection::Line;
 use super::{
-    Completion, Penalty, ReconstructError, Reconstruction, RegularisedSettings, Report, regularised,
+    Penalty, ReconstructError, Reconstruction, RegularisedSettings, Report, noise, regularised,
+    selection,
 };
 use crate::{Image, Measurements, Side, fwht, order, words};
 use std::fmt;
 use std::sync::Arc;
-
-/// Distance of a coefficient from its measurement that is allowed, in standard deviations of the
-/// estimated noise.
-pub const WITHIN: f32 = 2.0;
 
 /// The fewest patterns that a network completes: the estimates of noise and trust need some.
 pub const LEAST_PATTERNS: usize = 40;
 
 /// The least share of the patterns that a network completes. Training has 5 % and more.
 pub const LEAST_SHARE: f64 = 0.03;
+
+/// Number of parts of the measurements, each of which is held back once.
+const FOLDS: usize = 4;
 
 /// Trust below this is none: the image would differ from the start by less than the start's error.
 const LEAST_TRUST: f32 = 0.05;
@@ -89,7 +89,6 @@ impl PartialEq for SharedNetwork {
 }
 
 /// Reconstructs an image with a network, as far as held-back measurements support the network.
-/// `completion` is what becomes of measured coefficients; `None` keeps them within their noise.
 /// Without a network, or where the network cannot be used, the image is Tikhonov's, and
 /// [`Report::note`] says why.
 ///
@@ -98,12 +97,11 @@ impl PartialEq for SharedNetwork {
 pub fn with_network(
     measurements: &Measurements,
     network: Option<&dyn Network>,
-    completion: Option<Completion>,
     name: &str,
 ) -> Result<Reconstruction, ReconstructError> {
     let (network, seen) = match usable(measurements, network) {
         Ok(usable) => usable,
-        Err(why) => return classical(measurements, completion, name, &why),
+        Err(why) => return classical(measurements, name, &why),
     };
     let complete = |seen: &Seen| network.complete(seen).map_err(ReconstructError::Failed);
     let trust = match held_back(measurements) {
@@ -115,31 +113,50 @@ pub fn with_network(
     };
     if trust < LEAST_TRUST {
         let why = "held-back measurements do not support the network";
-        return classical(measurements, completion, name, why);
+        return classical(measurements, name, why);
     }
     let mut grid = complete(&seen)?;
-    for (row, value) in grid.iter_mut().enumerate() {
-        let start = seen.start()[row];
-        if seen.mask()[row] == 0.0 {
-            *value = start + trust * (*value - start);
-            continue;
-        }
-        let from = *value - seen.values()[row];
-        let within = WITHIN * seen.noise();
-        *value = seen.values()[row]
-            + trust
-                * match completion {
-                    None => from.clamp(-within, within),
-                    Some(Completion::Measured) => 0.0,
-                    Some(Completion::Sparse) => from,
-                };
+    believe(&seen, trust, &mut grid);
+    let held_back = without_each(measurements, &seen, trust, &complete)?;
+    for (&row, &predicted) in measurements.rows().iter().zip(&held_back) {
+        grid[row as usize] = predicted;
     }
+    let noise = noise::estimated_noise(measurements);
     let mut report = Report::new(name);
-    report.completion = completion;
+    report.held_back = seen.judge(measurements.rows(), &held_back);
+    report.reading_weight = Some(seen.weigh(measurements.rows(), noise, &mut grid));
     report.trust = Some(f64::from(trust));
-    report.noise = Some(seen.noise_in_units());
+    report.noise = Some(noise);
     report.residual = Some(seen.residual(&grid));
     Ok(Reconstruction { image: image(&seen, grid), report })
+}
+
+/// Goes from the start to the completion as far as the completion is believed.
+fn believe(seen: &Seen, trust: f32, completed: &mut [f32]) {
+    for (value, start) in completed.iter_mut().zip(seen.start()) {
+        *value = start + trust * (*value - start);
+    }
+}
+
+/// What the network predicts for each measurement without it, in the units of `seen`.
+fn without_each(
+    measurements: &Measurements,
+    seen: &Seen,
+    trust: f32,
+    complete: &impl Fn(&Seen) -> Result<Vec<f32>, ReconstructError>,
+) -> Result<Vec<f32>, ReconstructError> {
+    let rows = measurements.rows();
+    let mut predicted: Vec<f32> = rows.iter().map(|&row| seen.values()[row as usize]).collect();
+    for (kept, held) in selection::parts(rows, FOLDS) {
+        let Some(part) = Seen::new(&measurements.subset(kept)) else { continue };
+        let mut completed = complete(&part)?;
+        believe(&part, trust, &mut completed);
+        let factor = (part.unit() / seen.unit()) as f32;
+        for k in held {
+            predicted[k] = completed[rows[k] as usize] * factor;
+        }
+    }
+    Ok(predicted)
 }
 
 /// The network and what it is given; or why there is no use for the network.
@@ -171,17 +188,13 @@ fn usable<'n>(
 /// Tikhonov's image, with the reason for it.
 fn classical(
     measurements: &Measurements,
-    completion: Option<Completion>,
     name: &str,
     why: &str,
 ) -> Result<Reconstruction, ReconstructError> {
-    let settings = RegularisedSettings {
-        completion: completion.unwrap_or(Completion::Measured),
-        ..RegularisedSettings::new(Penalty::Tikhonov)
-    };
-    let found = regularised(measurements, &settings)?;
+    let found = regularised(measurements, &RegularisedSettings::new(Penalty::Tikhonov))?;
     let mut report = Report::new(name);
-    report.completion = Some(settings.completion);
+    report.reading_weight = Some(found.reading_weight);
+    report.held_back = found.held_back;
     report.residual = Some(found.residual);
     report.noise = Some(found.noise);
     report.note = Some(format!("Tikhonov instead: {why}"));

@@ -101,14 +101,13 @@ fn a_constant_image_stays_constant() {
 }
 
 #[test]
-fn to_keep_measured_values_keeps_them_exactly() {
+fn readings_without_noise_are_kept_exactly() {
     let truth = scene(side(32), 1);
     let all = measured(side(32), &truth);
     let blurred: Vec<f64> = truth.iter().map(|v| v * 0.99).collect();
     let network = Some(SharedNetwork::new(Oracle { truth: Some(blurred), seed: 0 }));
-    let completion = Some(Completion::Measured);
-    let settings = MethodSettings { network, completion, ..MethodSettings::default() };
-    let part = all.take(Some(&Order::ZigZag), 0.3).unwrap();
+    let settings = MethodSettings { network, ..MethodSettings::default() };
+    let part = all.take(Some(&Order::ZigZag), 0.3).unwrap().with_noise(0.0).unwrap();
     let made = Method::PRIOR.prepare(&settings).unwrap().reconstruct(&part).unwrap();
     assert!(made.report.trust.unwrap() > 0.5, "{}", made.report);
     let found = coefficients(&made.image);

@@ -50,7 +50,7 @@ fn each_minimum_is_one() {
     let part = measured(side, &scene(side, 1)).take(Some(&Order::ZigZag), 0.5).unwrap();
     let mut random = Pcg64::seed_from_u64(3);
     for penalty in ALL {
-        let problem = Problem::of(&part, Basis::Dct, 1.0, NoiseLevel::Known(0.5));
+        let problem = Problem::of(&part, Basis::Dct, Some(1.0), NoiseLevel::Known(0.5));
         let every: Vec<usize> = (0..part.rows().len()).collect();
         let predict = match penalty {
             Penalty::Tikhonov => tikhonov::predict,
@@ -144,7 +144,7 @@ fn settings_that_make_no_sense_are_named() {
     for strength in [Strength::CrossValidated { folds: 2 }, Strength::Fixed(1e6)] {
         assert_eq!(RegularisedSettings { strength, ..sound }.check(), Ok(()));
     }
-    let falloff = RegularisedSettings { falloff: -1.0, ..sound };
+    let falloff = RegularisedSettings { falloff: Some(-1.0), ..sound };
     assert!(refused(falloff).starts_with("falloff is -1"));
 }
 
