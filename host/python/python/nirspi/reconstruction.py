@@ -44,7 +44,7 @@ def bases() -> list[str]:
 def reconstruct(
     measurement: Measurement | str | os.PathLike[str],
     *,
-    method: str = "tikhonov",
+    method: str = "auto",
     sampling: float | str = 1.0,
     order: str | None = None,
     basis: str | None = None,
@@ -180,7 +180,7 @@ def reconstruct(
 
 def method_options(
     *,
-    method: str = "tikhonov",
+    method: str = "auto",
     sampling: float | str = 1.0,
     order: str | None = None,
     basis: str | None = None,
