@@ -51,6 +51,10 @@ pub struct Args {
     #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "keep", "residual", "stop_at_noise", "as_printed",
           "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
+    /// With --matrix: fit no dark level. By default one constant (ambient light, the offset of an amplifier) is fitted with
+    /// the image
+    #[arg(long, requires = "matrix")]
+    no_dark: bool,
     /// With --index all: start each frame from the frames before. omp starts from their atoms, as long as the result explains
     /// the readings as well; the other methods from their patterns, moved with the scene and weighted by what is left of them
     #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]

@@ -59,6 +59,7 @@ def reconstruct(
     keep: str | None = None,
     warm_start: bool = False,
     matrix: Any = None,
+    dark: bool = True,
     n: int | None = None,
     device: str = "auto",
     **source: Any,
@@ -102,6 +103,8 @@ def reconstruct(
         Start each measurement from those before it; not for ``hadamard`` and ``pseudo-inverse``.
     matrix : array_like, (M, n * n), optional
         Patterns of your own instead of Hadamard rows.
+    dark : bool
+        With ``matrix``: whether one constant, the reading without light, is fitted with the image.
     n : int, optional
         With ``matrix``: side of the image, if it is not the root of the matrix's columns.
     device : str
@@ -138,8 +141,11 @@ def reconstruct(
         non_negative=non_negative,
         keep=keep,
         warm_start=warm_start,
+        dark=dark,
         device=device,
     )
+    if not dark and matrix is None:
+        raise Error("dark belongs to a matrix")
     is_path = isinstance(measurement, (str, os.PathLike))
     unknown = ", ".join(name for name in source if not is_path or name not in _OF_FILES)
     if unknown:
@@ -196,6 +202,7 @@ def method_options(
     non_negative: bool = False,
     keep: str | None = None,
     warm_start: bool = False,
+    dark: bool = True,
     device: str = "auto",
 ) -> dict[str, Any]:
     """The options of :func:`reconstruct` as the compiled part takes them."""
@@ -213,6 +220,7 @@ def method_options(
         "non_negative": bool(non_negative),
         "keep": keep,
         "warm_start": bool(warm_start),
+        "dark": bool(dark),
         "device": str(device),
     }
 
