@@ -285,7 +285,9 @@ fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
     if let Some((_, explanation)) = best {
         return says(explanation);
     }
-    if let Some(each) = repeats::samples(&recorded, claim.side_guessed) {
+    if broken.above + broken.below > few(broken.readings)
+        && let Some(each) = repeats::samples(&recorded, claim.side_guessed)
+    {
         let averaged = repeats::averaged(&recorded, each);
         let averaged = averaged.as_chunks::<2>().0;
         if let Some(&[on, off]) = averaged.get(first)

@@ -22,39 +22,19 @@ pub(super) fn samples(y: &[f64], whole_sweeps: bool) -> Option<usize> {
             && (is_power_of_four || !whole_sweeps)
     };
     let changes: Vec<f64> = y.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-    // Single wild readings have the weight of the largest usual change.
-    let mut sorted = changes.clone();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let most = *sorted.get(sorted.len().saturating_sub(1 + (sorted.len() / 100).max(3)))?;
-    let mean = |of: &dyn Fn(usize) -> bool| {
-        let chosen = changes.iter().enumerate().filter(|(at, _)| of(*at));
-        let (sum, count) = chosen
-            .fold((0.0, 0_usize), |(sum, count), (_, change)| (sum + change.min(most), count + 1));
-        sum / count.max(1) as f64
+    let share_of = |chosen: &dyn Fn(usize) -> bool, share: f64| {
+        let mut chosen: Vec<f64> =
+            (0..changes.len()).filter(|&at| chosen(at)).map(|at| changes[at]).collect();
+        let place = ((chosen.len() as f64 * share) as usize).min(chosen.len().saturating_sub(1));
+        *chosen.select_nth_unstable_by(place, f64::total_cmp).1
     };
-    let overall = mean(&|_| true);
-    let mut best: Option<(f64, usize)> = None;
-    for each in (2..=MOST).filter(|&each| fits(each)) {
-        let between = mean(&|at| (at + 1) % each == 0);
-        let within = mean(&|at| (at + 1) % each != 0);
-        let steady = between / within.max(1e-6 * overall);
-        // Most blocks differ, not only those at a few coarse patterns, and within blocks is noise.
-        let at = |of: &dyn Fn(usize) -> bool, share: f64| {
-            let chosen = changes.iter().enumerate().filter(|(at, _)| of(*at));
-            let mut chosen: Vec<f64> = chosen.map(|(_, change)| *change).collect();
-            let place = ((chosen.len() as f64 * share) as usize).min(chosen.len() - 1);
-            *chosen.select_nth_unstable_by(place, f64::total_cmp).1
-        };
-        let usual = at(&|at| (at + 1) % each == 0, 0.5);
-        let noise = at(&|at| (at + 1) % each != 0, 0.9);
-        if steady > STEADY
-            && usual > STEADY * noise
-            && best.is_none_or(|(before, _)| steady > before)
-        {
-            best = Some((steady, each));
-        }
-    }
-    best.map(|(_, each)| each)
+    // Most blocks differ, and within blocks is noise. Of a number of samples and its multiples, the
+    // smallest one has no block twice.
+    (2..=MOST).filter(|&each| fits(each)).find(|each| {
+        let between = share_of(&|at| (at + 1) % each == 0, 0.4);
+        let within = share_of(&|at| (at + 1) % each != 0, 0.9);
+        between > STEADY * within
+    })
 }
 
 /// Every `each` readings as their mean.
