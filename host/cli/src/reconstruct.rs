@@ -118,7 +118,8 @@ pub fn picture(
         source = source.with_flat_field(kept);
     }
     let report = one_image(&request, source, stages())?;
-    Ok(report.enhancement.map(|enhancement| enhancement.warnings).unwrap_or_default())
+    let of_networks = report.enhancement.map(|enhancement| enhancement.warnings);
+    Ok(report.warnings.into_iter().chain(of_networks.unwrap_or_default()).collect())
 }
 
 fn one_image(request: &OneImage<'_>, source: Source, times: StageTimes) -> Result<OneReport> {

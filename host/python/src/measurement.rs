@@ -129,8 +129,11 @@ pub fn readings<'py>(
     let rows = rows(side(n)?, &shown)?;
     let y = slice(&y)?;
     let read = heavy(py, || law::read(&rows, y, form.into()).map_err(refusal))?;
-    let mut notes: Vec<String> =
-        read.dark_level.map(|level| format!("a dark level of {level:.4} was found in `y` and removed")).into_iter().collect();
+    let mut notes: Vec<String> = read
+        .dark_level
+        .map(|level| format!("a dark level of {level:.4} was found in `y` and removed"))
+        .into_iter()
+        .collect();
     notes.extend(warnings(&read.outliers, read.doubts.iter().map(Doubt::to_string)));
     let rows = array(py, numbers(read.measurements.rows()));
     Ok((rows, array(py, read.measurements.into_values()), lost(read.dropouts), notes))

@@ -118,7 +118,7 @@ impl Opened {
 
     /// A measurement without any pattern that was read.
     pub(super) fn no_pattern(&self) -> FileError {
-        let found = "has no pattern that was read: all are NaN";
+        let found = "has no pattern that was read: all are NaN or too large";
         FileError::field(self.fields.path(), self.readings.name.clone(), found, "finite readings")
     }
 
