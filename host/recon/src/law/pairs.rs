@@ -285,15 +285,19 @@ fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
     if let Some((_, explanation)) = best {
         return says(explanation);
     }
-    if broken.above + broken.below > few(broken.readings)
+    // Samples of one reading differ by noise alone, and so do the readings of a pair then.
+    let steady = deviation(pairs.iter().map(|[one, other]| (one - other).abs())).min(noise);
+    let sampled = Claimed { pairs, first: Some(first), noise: steady }.broken(on, off);
+    if sampled.above + sampled.below > few(sampled.readings)
         && let Some(each) = repeats::samples(&recorded, claim.side_guessed)
     {
         let averaged = repeats::averaged(&recorded, each);
         let averaged = averaged.as_chunks::<2>().0;
         if let Some(&[on, off]) = averaged.get(first)
-            && with(averaged).keeps(on, off)
+            && (Claimed { pairs: averaged, first: None, noise: steady }).keeps(on, off)
         {
-            return says(Explanation::Samples { each });
+            let (broken, explanation) = (sampled, Explanation::Samples { each });
+            return Some(Doubt::Form { claimed: claim.form, broken, explanation });
         }
     }
     if broken.above + broken.below <= few(broken.readings)
