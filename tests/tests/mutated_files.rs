@@ -190,7 +190,8 @@ fn measurements_in_every_form() {
     let rows = nirspi_recon::Rows::new(nirspi_recon::Side::new(4).unwrap(), rows).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.npz");
-    let (measurements, _) = nirspi_recon::Measurements::from_pairs(&rows, &readings).unwrap();
+    let measurements =
+        nirspi_recon::Measurements::from_pairs(&rows, &readings).unwrap().measurements;
     let npz = measurement::encode(&path, &measurements, true).unwrap();
     survives("m.npz", &npz, &read);
     let shown = Selection {

@@ -51,6 +51,10 @@ pub struct Args {
     #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed",
           "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
+    /// With --matrix: fit no dark level. By default one constant (ambient light, the offset of an amplifier) is fitted with
+    /// the image
+    #[arg(long, requires = "matrix")]
+    no_dark: bool,
     /// With --index all: start each frame from the frames before. omp starts from their atoms, as long as the result explains
     /// the readings as well; the other methods from their patterns, moved with the scene and weighted by what is left of them
     #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]
@@ -114,7 +118,8 @@ pub fn picture(
         source = source.with_flat_field(kept);
     }
     let report = one_image(&request, source, stages())?;
-    Ok(report.enhancement.map(|enhancement| enhancement.warnings).unwrap_or_default())
+    let of_networks = report.enhancement.map(|enhancement| enhancement.warnings);
+    Ok(report.warnings.into_iter().chain(of_networks.unwrap_or_default()).collect())
 }
 
 fn one_image(request: &OneImage<'_>, source: Source, times: StageTimes) -> Result<OneReport> {

@@ -223,7 +223,7 @@ fn instruments(data: &Path) -> Result<Vec<(String, Vec<Measurements>)>> {
     let wing = data.join("spi/opar_ala1.npz");
     let rows = Rows::new(Side::new(64)?, array::<i32>(&wing, "h_row")?)?;
     let y: Vec<f64> = array::<f32>(&wing, "y")?.into_iter().map(f64::from).collect();
-    let wing = Measurements::from_pairs(&rows, &y)?.0;
+    let wing = Measurements::from_pairs(&rows, &y)?.measurements;
     let car = data.join("spi/scheidt_car.npz");
     let rows = Rows::new(Side::new(32)?, array::<i32>(&car, "h_row")?)?;
     let d: Vec<f64> = array::<i32>(&car, "d")?.into_iter().map(f64::from).collect();

@@ -8,7 +8,7 @@ mod shorter_sweep;
 
 pub use shorter_sweep::ShorterSweep;
 
-use crate::dropout::{self, Dropout};
+use crate::law::{self, Form, Reading};
 use crate::{Order, Rows, RowsError, Side, order};
 use thiserror::Error;
 
@@ -36,8 +36,10 @@ pub enum MeasurementError {
         /// The length of the other lists.
         expected: usize,
     },
-    /// Drop-outs left no measurement.
-    #[error("no measurement is left, expected at least one that no drop-out touches")]
+    /// Drop-outs and outliers left no measurement.
+    #[error(
+        "no measurement is left, expected at least one that no drop-out touches and that light can have given"
+    )]
     Empty,
     /// A value is NaN or infinite.
     #[error("{field}[{index}] is {found}, expected a finite number")]
@@ -81,36 +83,12 @@ impl Measurements {
 
     /// Measurements from raw readings in time order, each pattern followed by its complement:
     /// `y = [+, -, +, -, ...]`, `2 * rows.len()` readings. A constant dark level cancels in each
-    /// difference.
-    ///
-    /// The result leaves out the pairs that a [`Dropout`] touched, and the list names the
-    /// drop-outs.
+    /// difference. As [`law::read`] of [`Form::Pairs`].
     ///
     /// # Errors
-    /// [`MeasurementError`] if there are not two readings for each row, or a reading is not finite;
-    /// [`Empty`](MeasurementError::Empty) if no pair is left.
-    pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<(Self, Vec<Dropout>), MeasurementError> {
-        expect_length("y", y.len(), 2 * rows.len())?;
-        expect_finite("y", y)?;
-        let dropouts = dropout::find(rows, y);
-        let mut lost = vec![false; rows.len()];
-        for dropout in &dropouts {
-            lost[dropout.pairs()].fill(true);
-        }
-        let (mut kept, mut values) = (Vec::new(), Vec::new());
-        for ((&row, pair), _) in
-            rows.iter().zip(y.as_chunks::<2>().0).zip(&lost).filter(|(_, lost)| !**lost)
-        {
-            kept.push(row);
-            values.push(pair[0] - pair[1]);
-        }
-        if kept.is_empty() {
-            return Err(MeasurementError::Empty);
-        }
-        expect_finite("d", &values)?; // readings near the end of f64's range may differ by more
-        let rows =
-            if dropouts.is_empty() { rows.clone() } else { Rows::trusted(rows.side(), kept) };
-        Ok((Self { rows, values, noise: None }, dropouts))
+    /// As [`law::read`].
+    pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<Reading, MeasurementError> {
+        law::read(rows, y, Form::Pairs.into())
     }
 
     /// Measurements from readings of the positive patterns alone (light where `H` is +1):
@@ -176,6 +154,11 @@ impl Measurements {
         Self { rows, values, noise: None }
     }
 
+    /// Replaces the value at a position by a finite one.
+    pub(crate) fn replace(&mut self, position: usize, value: f64) {
+        self.values[position] = value;
+    }
+
     /// The measurements at these positions, in that order.
     pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();
@@ -230,7 +213,7 @@ impl Measurements {
     }
 }
 
-fn expect_length(
+pub(crate) fn expect_length(
     field: &'static str,
     found: usize,
     expected: usize,
@@ -242,7 +225,7 @@ fn expect_length(
     }
 }
 
-fn expect_finite(field: &'static str, values: &[f64]) -> Result<(), MeasurementError> {
+pub(crate) fn expect_finite(field: &'static str, values: &[f64]) -> Result<(), MeasurementError> {
     // Without an early end, so that the compiler uses vectors.
     if values.iter().fold(true, |finite, value| finite & value.is_finite()) {
         return Ok(());

@@ -46,7 +46,9 @@ pub use method::{Method, MethodSettings, OwnAtoms, ParseMethodError, Reconstruct
 pub use methods::hadamard;
 pub use noise::estimated_noise;
 pub use own_atoms::omp_over;
-pub use own_matrix::{MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix};
+pub use own_matrix::{
+    DarkLevel, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix,
+};
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings, believed_frame, fused_frame};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};

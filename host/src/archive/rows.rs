@@ -9,7 +9,7 @@ use crate::export::{ExportError, Whole};
 use crate::imaging::FramesError;
 use crate::imaging::MethodReport;
 use crate::reconstruct::{Solved, Solver, SolverError};
-use crate::source::{Index, Source, SourceError, SourceOptions};
+use crate::source::{Index, OutlierReport, Source, SourceError, SourceOptions};
 #[cfg(feature = "enhance")]
 use nirspi_nets::Device;
 use nirspi_recon::Measurements;
@@ -211,8 +211,10 @@ pub(super) fn meta(of_camera: &str, source: &Source, solved: &Solved) -> String 
         "used": solved.used.rows().len(),
         "order": solved.order,
         "dropouts": dropouts.collect::<Vec<_>>(),
+        "outliers": source.outliers.iter().map(OutlierReport::of).collect::<Vec<_>>(),
         "not_read": source.not_read,
         "frames": source.frames,
+        "warnings": source.warnings,
         "notes": source.notes,
     });
     meta.insert("reconstruction".to_owned(), made);

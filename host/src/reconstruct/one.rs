@@ -6,7 +6,7 @@ use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
 use crate::imaging::{FrameReport, FramesError, MethodReport, enhance_frames};
 use crate::picture::{Pictures, Unit};
-use crate::source::{Part, Source};
+use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, metrics};
@@ -57,6 +57,8 @@ pub struct OneReport {
     pub method: MethodReport,
     /// Readings that were lost.
     pub dropouts: Vec<DropoutReport>,
+    /// Readings that light cannot have given, whose patterns are left out.
+    pub outliers: Vec<OutlierReport>,
     /// Positions in the order shown of patterns that the file marks as not read.
     pub not_read: Vec<usize>,
     /// The part of complex readings in image.npy.
@@ -71,6 +73,8 @@ pub struct OneReport {
     /// What the networks report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub enhancement: Option<FrameReport>,
+    /// What contradicts the readings.
+    pub warnings: Vec<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
     /// What is black and white in the pictures.
@@ -99,6 +103,7 @@ impl OneReport {
                 count_of(dropout.rows.len(), "pattern")
             )
         }));
+        lines.extend(self.outliers.iter().map(OutlierReport::to_string));
         lines.extend((!self.not_read.is_empty()).then(|| not_read_words(&self.not_read)));
         lines.extend(self.frames.map(|frames| format!("frames: {frames}")));
         lines.push(self.method.to_string());
@@ -109,6 +114,7 @@ impl OneReport {
             lines.push(enhancement.line());
             lines.extend(enhancement.warnings.iter().map(|warning| format!("warning: {warning}")));
         }
+        lines.extend(self.warnings.iter().map(|warning| format!("warning: {warning}")));
         lines
     }
 }
@@ -172,11 +178,13 @@ pub fn one_image(
         order,
         method,
         dropouts: dropouts.collect(),
+        outliers: source.outliers.iter().map(OutlierReport::of).collect(),
         not_read: source.not_read,
         part: parts.as_ref().map(|_| Part::Magnitude.name()),
         frames: source.frames,
         correlation_with_files_recon: correlation,
         enhancement,
+        warnings: source.warnings,
         notes: source.notes,
         stage_ms: times,
     };

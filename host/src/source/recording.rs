@@ -109,16 +109,20 @@ fn of_frames(
     let measurements = integrated
         .measurements_of(detector, setup, settling.as_ref(), options.keep_leak)
         .map_err(|problem| SourceError::Integrate { path: path.to_owned(), problem })?;
+    let read = super::of_frames(measurements)
+        .map_err(|problem| SourceError::Measurements { path: path.to_owned(), problem })?;
     let (dropouts, not_read, frames) = (Vec::new(), Vec::new(), Some(counters));
     let (imaginary, reference, flat_field) = (None, None, None);
     let source = Source {
-        measurements,
+        measurements: read.measurements,
         imaginary,
         dropouts,
+        outliers: read.outliers,
         not_read,
         reference,
         frames,
         simulated: Some(boards::is_simulated(&recording.identity.board)),
+        warnings: read.doubts.iter().map(ToString::to_string).collect(),
         notes,
         flat_field,
     };

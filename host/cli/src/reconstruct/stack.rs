@@ -11,7 +11,7 @@ use nirspi::files::output::OutputDir;
 use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
 use nirspi::picture::{Pictures, Unit};
 use nirspi::reconstruct::{check_finite, not_read_words};
-use nirspi::source::{FirstPatterns, Index};
+use nirspi::source::{FirstPatterns, Index, OutlierReport};
 use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Measurements, Rows};
@@ -39,6 +39,8 @@ struct FrameReport {
     method: MethodReport,
     #[serde(skip_serializing_if = "Option::is_none")]
     enhancement: Option<Enhanced>,
+    outliers: Vec<OutlierReport>,
+    warnings: Vec<String>,
     notes: Vec<String>,
 }
 
@@ -91,9 +93,19 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         if !source.not_read.is_empty() {
             notes.push(not_read_words(&source.not_read));
         }
+        let outliers: Vec<_> = source.outliers.iter().map(OutlierReport::of).collect();
+        let warnings = source.warnings;
         notes.extend(source.notes);
         let used = used.rows().len();
-        frames.push(FrameReport { used, warm, method: report, enhancement: None, notes });
+        frames.push(FrameReport {
+            used,
+            warm,
+            method: report,
+            enhancement: None,
+            outliers,
+            warnings,
+            notes,
+        });
         images.push(image);
     }
     let mut sharp = None;
@@ -165,7 +177,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     }
     for (at, frame) in report.frames.iter().enumerate() {
         let warnings = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
-        for warning in warnings {
+        for outlier in &frame.outliers {
+            print::line(format_args!("{what} {at}: {outlier}"))?;
+        }
+        for warning in warnings.chain(&frame.warnings) {
             print::line(format_args!("warning: {what} {at}: {warning}"))?;
         }
         for note in &frame.notes {

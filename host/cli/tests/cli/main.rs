@@ -25,6 +25,7 @@ mod packaging;
 mod preview;
 mod quality;
 mod rain;
+mod readings;
 mod readme;
 mod real_data;
 mod reconstruct;

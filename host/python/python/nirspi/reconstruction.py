@@ -58,6 +58,7 @@ def reconstruct(
     non_negative: bool = False,
     warm_start: bool = False,
     matrix: Any = None,
+    dark: bool = True,
     n: int | None = None,
     device: str = "auto",
     **source: Any,
@@ -99,6 +100,8 @@ def reconstruct(
         Start each measurement from those before it; not for ``hadamard`` and ``pseudo-inverse``.
     matrix : array_like, (M, n * n), optional
         Patterns of your own instead of Hadamard rows.
+    dark : bool
+        With ``matrix``: whether one constant, the reading without light, is fitted with the image.
     n : int, optional
         With ``matrix``: side of the image, if it is not the root of the matrix's columns.
     device : str
@@ -134,8 +137,11 @@ def reconstruct(
         as_printed=as_printed,
         non_negative=non_negative,
         warm_start=warm_start,
+        dark=dark,
         device=device,
     )
+    if not dark and matrix is None:
+        raise Error("dark belongs to a matrix")
     is_path = isinstance(measurement, (str, os.PathLike))
     unknown = ", ".join(name for name in source if not is_path or name not in _OF_FILES)
     if unknown:
@@ -191,6 +197,7 @@ def method_options(
     as_printed: bool = False,
     non_negative: bool = False,
     warm_start: bool = False,
+    dark: bool = True,
     device: str = "auto",
 ) -> dict[str, Any]:
     """The options of :func:`reconstruct` as the compiled part takes them."""
@@ -207,6 +214,7 @@ def method_options(
         "as_printed": bool(as_printed),
         "non_negative": bool(non_negative),
         "warm_start": bool(warm_start),
+        "dark": bool(dark),
         "device": str(device),
     }
 

@@ -155,7 +155,7 @@ fn tikhonov_beats_zero_filling_on_real_measurements_at_every_share() {
         let rows = Rows::new(side(size), array::<i32>(&mut file, "h_row")).unwrap();
         let all = if field == "y" {
             let y: Vec<f64> = array::<f32>(&mut file, "y").into_iter().map(f64::from).collect();
-            Measurements::from_pairs(&rows, &y).unwrap().0
+            Measurements::from_pairs(&rows, &y).unwrap().measurements
         } else {
             let d: Vec<f64> = array::<i32>(&mut file, "d").into_iter().map(f64::from).collect();
             Measurements::from_differential(&rows, &d[..rows.len()]).unwrap()
