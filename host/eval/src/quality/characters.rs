@@ -86,12 +86,23 @@ impl Characters {
         count: usize,
         seed: u64,
     ) -> Self {
+        Self::of_each(stacks, groups, &|_| count, seed)
+    }
+
+    /// As [`of`](Self::of), with a number of images that depends on the stack's name.
+    #[must_use]
+    pub fn of_each(
+        stacks: &[Stack],
+        groups: &BTreeMap<String, Vec<u32>>,
+        count: &dyn Fn(&str) -> usize,
+        seed: u64,
+    ) -> Self {
         let mut all = Self { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
         let named: Vec<Option<&[u32]>> =
             stacks.iter().map(|stack| groups.get(stack.name()).map(Vec::as_slice)).collect();
         let unseen = Families::of(stacks).unseen(&named);
         for ((stack, named), unseen) in stacks.iter().zip(named).zip(unseen) {
-            all.add(stack, named, &unseen, count, seed);
+            all.add(stack, named, &unseen, count(stack.name()), seed);
         }
         all
     }
