@@ -37,8 +37,13 @@ pub struct Args {
     steps: NonZeroU32,
     /// Also write the half-width of the calibrated 95 % interval of each pixel (.npy). An interval needs to know how the
     /// images were made: --method, --sampling and --readings-noise
-    #[arg(long, value_name = "FILE", requires = "method", requires = "sampling",
-          requires = "readings_noise")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "method",
+        requires = "sampling",
+        requires = "readings_noise"
+    )]
     interval: Option<PathBuf>,
     /// With --interval: the method that made the images of the readings, with its default settings
     #[arg(long, value_name = "METHOD", requires = "interval",

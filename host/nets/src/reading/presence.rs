@@ -61,6 +61,11 @@ pub fn inputs(features: &[f32], logits: &[f32], image: &[f32]) -> Vec<f32> {
     all
 }
 
+/// The first number about an image: its standard deviation, on the scale of the network.
+pub(super) fn of_deviation(deviation: f32) -> f32 {
+    (deviation + 0.01).ln()
+}
+
 fn numbers(logits: &[f32], image: &[f32]) -> [f32; NUMBERS] {
     let mean = |values: &mut dyn Iterator<Item = f32>| {
         let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
@@ -80,7 +85,7 @@ fn numbers(logits: &[f32], image: &[f32]) -> [f32; NUMBERS] {
     let steps = mean(&mut (0..AREA - SIDE).map(|at| (image[at + SIDE] - image[at]).abs()));
     let (ink, pieces) = ink(image, rim_level);
     [
-        (deviation + 0.01).ln(),
+        of_deviation(deviation),
         level,
         (rim_deviation + 0.01).ln(),
         rim_level,
