@@ -11,7 +11,7 @@ use nirspi::files::image::encode_grey;
 use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi::imaging::{Fitted, MethodReport, Quality, compare};
+use nirspi::imaging::{Fitted, KnownReadings, MethodReport, Quality, compare};
 use nirspi::picture::Pictures;
 use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
@@ -130,7 +130,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let truth = optics.focused_footprint()?.weights().to_vec();
     let raw = compare(&raw, &truth)?;
     let fitted = compare(&image, &truth)?;
-    let stages = enhance_stages(&image, measurements.rows(), &optics, seed, &mut times)?;
+    // The photon budget gives the noise of a difference.
+    let settings = args.method.settings_for(measurements.side().pixels())?;
+    let noise = Some(optics.difference_noise_counts(frames));
+    let readings = KnownReadings::new(args.method.method, &settings, &measurements, noise);
+    let rows = measurements.rows();
+    let stages = enhance_stages(&image, rows, readings, &optics, seed, &mut times)?;
     if fitted.quality.inverted {
         notes.push(
             "the image is darker where the scene is brighter: it is scored as blank".to_owned(),
@@ -214,13 +219,13 @@ fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
     let measurement = args.out.join("measurement.npz");
     out.write("measurement.npz", &encode_measurement(&measurement, &images.measurements, true)?)?;
     out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &stages.truth))?;
-    for (name, image) in [
-        ("upscaled", &stages.upscaled),
-        ("fused", &stages.fused),
-        ("deblurred", &stages.deblurred),
-        ("interval", &stages.half_width),
-    ] {
+    for (name, image) in
+        [("upscaled", &stages.upscaled), ("fused", &stages.fused), ("deblurred", &stages.deblurred)]
+    {
         out.write(&format!("{name}.npy"), &npy::encode(&[2 * side, 2 * side], image))?;
+    }
+    if let Some(half_width) = &stages.half_width {
+        out.write("interval.npy", &npy::encode(&[2 * side, 2 * side], half_width))?;
     }
     report.pictures.write(&mut out)?;
     out.write("report.json", to_json(report)?.as_bytes())?;

@@ -14,6 +14,8 @@ mod frames;
 mod method_report;
 mod quality;
 #[cfg(feature = "enhance")]
+mod readings;
+#[cfg(feature = "enhance")]
 mod stack_report;
 #[cfg(feature = "enhance")]
 mod warning;
@@ -25,6 +27,8 @@ pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COP
 pub use frames::{FrameReport, FramesError, enhance_frames, enhance_frames_by};
 pub use method_report::MethodReport;
 pub use quality::{Fit, Fitted, Quality, compare};
+#[cfg(feature = "enhance")]
+pub use readings::KnownReadings;
 #[cfg(feature = "enhance")]
 pub use stack_report::{Deblurring, StackReport};
 #[cfg(feature = "enhance")]

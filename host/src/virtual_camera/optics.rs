@@ -144,6 +144,25 @@ impl VirtualOptics {
         self.budget.electrons_per_led / self.chain.electrons_per_count
     }
 
+    /// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared, for this light
+    /// in counts: shot noise of the LEDs' light and of daylight, amplifier, ADC, rounding.
+    #[must_use]
+    pub fn mean_variance(&self, light_counts: f64, sweeps: u32) -> f64 {
+        let gain = self.chain.electrons_per_count;
+        let electrons = (light_counts * gain).max(0.0) + self.chain.ambient_electrons;
+        let readout = self.camera.readout;
+        let window = u32::from(readout.clocks_per_pattern.saturating_sub(readout.blanked));
+        self.chain.variance_of_mean(electrons, window) / (gain * gain) / f64::from(sweeps)
+    }
+
+    /// Standard deviation of the difference of a pattern and its complement in `sweeps` sweeps, in ADC
+    /// counts, from the photon budget. Each pattern lights half of the LEDs.
+    #[must_use]
+    pub fn difference_noise_counts(&self, sweeps: u32) -> f64 {
+        let light: f64 = self.footprint.weights().iter().map(|&w| f64::from(w)).sum();
+        (2.0 * self.mean_variance(light * self.white_counts() / 2.0, sweeps)).sqrt()
+    }
+
     /// The serial number of the virtual camera with this seed. Cameras with different instruments
     /// have different serial numbers, so that no camera uses another camera's kept calibration;
     /// scenes do not matter

@@ -43,7 +43,12 @@ impl Panels<'_> {
         let mut all = self.side_by_side();
         pictures.add("side_by_side.png", &all);
         all.panels.push(panel("upscaled", deblur::SIDE, &self.stages.upscaled, Vec::new()));
-        let names = ["raw", "reconstruction", "fused", "deblurred", "interval", "upscaled"];
+        let interval = self.stages.half_width.as_ref().map(|_| "interval");
+        let names: Vec<&str> = ["raw", "reconstruction", "fused", "deblurred"]
+            .into_iter()
+            .chain(interval)
+            .chain(["upscaled"])
+            .collect();
         pictures.each(&names, &all.panels[2..]);
         pictures
     }
@@ -66,7 +71,11 @@ impl Panels<'_> {
         let large = |title, values, caption| panel(title, deblur::SIDE, values, caption);
         let deblurred =
             vec![metrics(&enhancement.deblurred), bridge, enhancement.reading.to_string()];
-        SideBySide {
+        let uncertainty = self.stages.half_width.as_deref().map(|half_width| Panel {
+            range: Range::Fixed(0.0, 0.5),
+            ..large("uncertainty: bright is unsure", half_width, enhancement.trust())
+        });
+        let mut made = SideBySide {
             header: format!("{} at {distance_m} m, seen with one pixel", map.title()),
             panels: vec![
                 panel("scene", map.size_px, &map.reflectance, vec![size]),
@@ -90,10 +99,6 @@ impl Panels<'_> {
                     warnings: enhancement.short_warnings.clone(),
                     ..large("deblurred", &self.stages.deblurred, deblurred)
                 },
-                Panel {
-                    range: Range::Fixed(0.0, 0.5),
-                    ..large("trust: 95 % interval, ±", &self.stages.half_width, enhancement.trust())
-                },
             ],
             footer: format!(
                 "simulated: virtual camera, weather {}, seed {}; {} frames of {patterns} patterns, {:.1} ms of light; {} lost, {} corrupt, {} late",
@@ -105,7 +110,9 @@ impl Panels<'_> {
                 counters.corrupt,
                 counters.late
             ),
-        }
+        };
+        made.panels.extend(uncertainty);
+        made
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::VirtualOptics;
 use crate::imaging::{
-    Enhance, EnhanceError, ImageContext, Quality, Warning, White, compare, warnings,
+    Enhance, EnhanceError, ImageContext, KnownReadings, Quality, Warning, White, compare, warnings,
 };
 use crate::stage_times::StageTimes;
 use nirspi_nets::interval::{Intervals, NoIntervals, share_of_prior};
@@ -30,8 +30,9 @@ pub struct Stages {
     pub fused: Vec<f32>,
     /// The deblurred image.
     pub deblurred: Vec<f32>,
-    /// Half-width of the 95 % interval of each pixel of the deblurred image; white is 1.
-    pub half_width: Vec<f32>,
+    /// Half-width of the 95 % interval of each pixel of the deblurred image; white is 1. `None` where
+    /// the calibration does not reach ([`StagesReport::no_interval`]).
+    pub half_width: Option<Vec<f32>>,
     /// Qualities and estimates.
     pub report: StagesReport,
 }
@@ -87,15 +88,18 @@ pub struct StagesReport {
     pub noise: f32,
     /// Distance of the readings from the readings of the result, divided by their noise.
     pub inconsistency: f32,
-    /// Mean half-width of the 95 % intervals of the pixels; white is 1.
-    pub mean_half_width: f32,
+    /// Noise of the readings, from the camera: of a pixel of the plain transform of all patterns;
+    /// white is 1. `null` if it is not known.
+    pub readings_noise: Option<f32>,
+    /// Mean half-width of the 95 % intervals of the pixels; white is 1. `null` without intervals.
+    pub mean_half_width: Option<f32>,
     /// Share of the pixels whose interval is so wide that the image is the prior's there and not
-    /// the data's.
-    pub prior_share: f32,
-    /// What the intervals are calibrated for.
-    pub interval_note: &'static str,
-    /// The character in the image as the classifier reads it: the likeliest alternatives, or that
-    /// none is legible. The classifier knows 62 characters and nothing else.
+    /// the data's. `null` without intervals.
+    pub prior_share: Option<f32>,
+    /// Why there are no intervals.
+    pub no_interval: Option<String>,
+    /// The character in the image as the classifier reads it: the likeliest alternatives, that none
+    /// is legible, or that the image shows no single character.
     pub reading: Reading,
     /// Number of depth zones that see the field and have a distance.
     pub depth_zones: usize,
@@ -125,30 +129,35 @@ impl StagesReport {
     /// How far the deblurred image can be trusted, in two short lines.
     #[must_use]
     pub fn trust(&self) -> Vec<String> {
-        vec![
-            format!("mean ± {:.3} of white", self.mean_half_width),
-            format!("{:.1} % of the pixels are the prior's", 100.0 * self.prior_share),
-        ]
+        match (self.mean_half_width, self.prior_share) {
+            (Some(mean), Some(share)) => vec![
+                format!("mean ± {mean:.3} of white"),
+                format!("{:.1} % of the pixels are the prior's", 100.0 * share),
+            ],
+            _ => vec!["no intervals".to_owned(), "not calibrated for this".to_owned()],
+        }
     }
 
     /// The same and the character in the image, in one line.
     #[must_use]
     pub fn trust_line(&self) -> String {
-        format!(
-            "95 % intervals: {}; as a single character: {}",
-            self.trust().join(", "),
-            self.reading
-        )
+        let intervals = match &self.no_interval {
+            Some(why) => why.clone(),
+            None => format!("95 % intervals: {}", self.trust().join(", ")),
+        };
+        format!("{intervals}; as a single character: {}", self.reading)
     }
 }
 
 /// Runs the stages on an image in ADC counts that was reconstructed from these Hadamard rows.
+/// `readings` says by which method, and how noisy its readings were.
 ///
 /// # Errors
 /// [`StagesError`] if a stage failed.
 pub fn enhance_stages(
     image: &Image,
     rows: &Rows,
+    readings: Option<KnownReadings>,
     optics: &VirtualOptics,
     seed: u64,
     times: &mut StageTimes,
@@ -163,6 +172,7 @@ pub fn enhance_stages(
     let white = White::Known(optics.white_counts() as f32);
     let known = ImageContext {
         rows: Some(rows),
+        readings,
         depth: Some(&depth),
         least_blur_px: defocus_px,
         seed,
@@ -181,8 +191,8 @@ pub fn enhance_stages(
         judge(&made.pixels)?,
     );
     let warnings = warnings(&made);
-    let half_width = made.half_width.clone().unwrap_or_default();
-    let reading = times.time("read_character", || reading(&made.pixels))?;
+    let half_width = made.half_width.clone();
+    let reading = times.time("read_character", || reading(&made.pixels, made.inconsistency))?;
     let report = StagesReport {
         upscaled: upscaled.quality,
         fused: fused.quality,
@@ -193,10 +203,10 @@ pub fn enhance_stages(
         defocus_px,
         noise: made.noise,
         inconsistency: made.inconsistency,
-        mean_half_width: half_width.iter().sum::<f32>() / half_width.len().max(1) as f32,
-        prior_share: share_of_prior(&half_width),
-        interval_note: "calibrated on images of all patterns, with white noise and Gaussian blur; fewer patterns are not \
-                        in the calibration",
+        readings_noise: readings.map(|readings| readings.noise / made.white),
+        mean_half_width: half_width.as_ref().map(|w| w.iter().sum::<f32>() / w.len().max(1) as f32),
+        prior_share: half_width.as_deref().map(share_of_prior),
+        no_interval: made.no_interval.clone(),
         reading,
         depth_zones: view.zones,
         device: enhance.device().name().to_owned(),
@@ -216,9 +226,10 @@ pub fn enhance_stages(
 }
 
 /// Reads the character in an image of 64 x 64.
-fn reading(pixels: &[f32]) -> Result<Reading, StagesError> {
-    let scale = Intervals::shipped()?.calibration().characters;
+fn reading(pixels: &[f32], inconsistency: f32) -> Result<Reading, StagesError> {
+    let scale = Intervals::shipped()?.calibration().characters.clone();
     let reader = Reader::new(&Weights::embedded("classifier")?, scale)?;
-    let mut read = reader.read(Images::new(pixels).map_err(EnhanceError::from)?);
+    let images = Images::new(pixels).map_err(EnhanceError::from)?;
+    let mut read = reader.read(images, &[inconsistency]);
     Ok(read.swap_remove(0))
 }

@@ -58,7 +58,7 @@ fn the_letter_is_captured_without_loss_and_plain_to_see() {
     assert!(enhancement["prior_share"].as_f64().unwrap() < 0.2, "{enhancement}");
     let reading = &enhancement["reading"];
     assert_eq!(reading["alternatives"][0]["characters"], "R", "{reading}");
-    assert_eq!(reading["legible"], true);
+    assert_eq!((&reading["legible"], &reading["answer"]), (&true.into(), &"character".into()));
     // What was written is what was judged.
     let judged =
         bench.run(&["metrics", "demo/truth.npy", "demo/reconstruction.npy"]).succeeded().json();
