@@ -14,7 +14,8 @@ mod natural;
 
 use natural::Scenes;
 use nirspi::files::characters;
-use nirspi::files::image::encode_rgb;
+use nirspi::picture::signed_png;
+use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::trust::{Report, Settings, calibrate, judge};
 use nirspi_nets::Intervals;
 use nirspi_nets::data::{Kind, Stack};
@@ -30,6 +31,12 @@ const EXPECTED: &str = "expected calibrate DATA FILE [WEIGHTS] or judge DATA FIL
 const SEED: u64 = 1;
 /// The most images of each stack of a calibration.
 const COUNT: usize = 200;
+
+/// The provenance of the pictures: scenes are simulated.
+fn provenance() -> Provenance {
+    let made = Made::now("trust", None, std::env::args());
+    Taken::without_camera(Origin::Simulated).made(&made)
+}
 
 fn main() -> Result<()> {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
@@ -58,7 +65,7 @@ fn main() -> Result<()> {
             let judged = judge(&settings, &intervals, &progress)?;
             std::fs::create_dir_all(&out)?;
             for (name, picture) in &judged.pictures {
-                std::fs::write(out.join(name), encode_rgb(picture))?;
+                std::fs::write(out.join(name), signed_png(picture, &provenance()))?;
             }
             std::fs::write(out.join("trust.json"), serde_json::to_string_pretty(&judged.report)?)?;
             say(&judged.report);

@@ -22,11 +22,11 @@ mod white;
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COPIES, White};
 #[cfg(feature = "enhance")]
-pub use frames::{FrameReport, FramesError, enhance_frames, enhance_frames_by};
+pub use frames::{FrameReport, FramesError, enhance_frame, enhance_frames, enhance_frames_by};
 pub use method_report::MethodReport;
 pub use quality::{Fit, Fitted, Quality, compare};
 #[cfg(feature = "enhance")]
 pub use stack_report::{Deblurring, StackReport};
 #[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};
-pub use white::{SteadyWhite, brightest};
+pub use white::SteadyWhite;

@@ -18,13 +18,15 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     takes: &[Setting::WarmStart],
     with_matrix: None,
     prepare: |settings| {
-        let (network, completion) = (settings.network.clone(), settings.completion);
-        Ok(Box::new(Prior { network, completion }))
+        let Some(network) = settings.network.clone() else {
+            return Err(ReconstructError::NeedsNetwork { method: Method::PRIOR });
+        };
+        Ok(Box::new(Prior { network, completion: settings.completion }))
     },
 });
 
 struct Prior {
-    network: Option<SharedNetwork>,
+    network: SharedNetwork,
     completion: Option<Completion>,
 }
 
@@ -34,8 +36,7 @@ impl Reconstruct for Prior {
     }
 
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
-        let network = self.network.as_ref().map(SharedNetwork::get);
-        with_network(measurements, network, self.completion, NAME)
+        with_network(measurements, self.network.get(), self.completion, NAME)
     }
 
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {

@@ -40,7 +40,7 @@ fn a_networks_images_are_those_that_it_made() {
         for known in [0.3, 0.9, 3.0, -2.0] {
             let network = Half { truth: scene(side(16), kind), known };
             for completion in [None, Some(Completion::Measured), Some(Completion::Sparse)] {
-                let made = with_network(&part, Some(&network), completion, "half").unwrap();
+                let made = with_network(&part, &network, completion, "half").unwrap();
                 table.made(&format!("{known} known, {completion:?}, {name}"), &made);
             }
         }
