@@ -7,7 +7,7 @@ use crate::files::image::encode_rgb;
 use crate::provenance::Provenance;
 use image::{RgbImage, imageops};
 
-const LEFT_PX: u32 = 24;
+const LEFT_PX: u32 = 36;
 const BELOW_PX: u32 = 16;
 
 /// The picture with its provenance in words below it.

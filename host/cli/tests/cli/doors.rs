@@ -19,10 +19,10 @@ fn one_recording_gives_one_picture_through_every_door() {
     let lab = ["--camera-model", "lab.toml"];
     bench.run(&[&["calibrate", "--white", "--sweeps", "200"][..], &lab].concat()).succeeded();
     let capture = ["capture", "--frames", "40", "--out", "rec.mcap", "--picture", "seen"];
-    bench.run(&[&capture[..], &lab].concat()).succeeded();
-    bench.run(&["reconstruct", "rec.mcap", "--enhance", "--out", "rec"]).succeeded();
+    done(&bench, &[&capture[..], &lab].concat());
+    done(&bench, &["reconstruct", "rec.mcap", "--enhance", "--out", "rec"]);
     let plain = ["reconstruct", "rec.mcap", "--enhance", "--no-flat-field", "--out", "plain"];
-    bench.run(&plain).succeeded();
+    done(&bench, &plain);
     for name in ["image.npy", "enhanced.npy"] {
         let door = |folder: &str| bench.pixels(&format!("{folder}/{name}"));
         assert_eq!(door("seen"), door("rec"), "{name}");
@@ -51,6 +51,13 @@ fn one_recording_gives_one_picture_through_every_door() {
     let answer = server.get("/image.npy");
     bench.write("live.npy", &answer.body);
     assert_eq!(bench.pixels("live.npy"), bench.pixels("rec/image.npy"));
+}
+
+/// Runs a command to its end. It may warn of the image.
+#[track_caller]
+fn done(bench: &Bench, arguments: &[&str]) {
+    let outcome = bench.run(arguments);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
 }
 
 /// The flat field that `calibrate --white` has kept.

@@ -219,7 +219,7 @@ fn tables_charts_and_times_are_signed() {
     let timed = ["bench", "enhance", "--frames", "1", "--repeats", "1", "--backend", "cpu"];
     says(run(&bench, &timed), Origin::Computed, "bench enhance");
     bench.write("a.npy", &encode(&[16, 16], &[0.5_f32; 256]));
-    let metrics = ["metrics", "--reference", "a.npy", "--test", "a.npy"];
+    let metrics = ["metrics", "a.npy", "a.npy"];
     let said = run(&bench, &metrics);
     says(said, Origin::Computed, "metrics");
     for name in ["calibrate", "selftest"] {
