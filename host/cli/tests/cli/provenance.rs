@@ -226,8 +226,8 @@ fn tables_charts_and_times_are_signed() {
         let said = says(run(&bench, &[name, "--json"]), SIMULATED, name);
         assert_eq!(said.taken.camera.unwrap().serial, "virtual-1");
     }
-    run(&bench, &["example", "letter", "--out", "letter.npz"]).succeeded();
-    is_signed("example", &of_npz(&bench.path("letter.npz")), SIMULATED, "example");
+    run(&bench, &["example", "wing", "--out", "wing.npz"]).succeeded();
+    is_signed("example", &of_npz(&bench.path("wing.npz")), SIMULATED, "example");
 }
 
 #[test]
