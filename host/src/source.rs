@@ -6,15 +6,18 @@ use crate::capture::Capture;
 use crate::files::FileError;
 use crate::files::measurement::{self, Form, MeasurementFile, Readings, Reference, Selection};
 use crate::integrate::IntegrateError;
+use crate::provenance::Taken;
 use crate::recording::RecordingError;
 use crate::session::CameraIdentity;
 use crate::tally::Misfit;
 use nirspi_recon::law::{self, Doubt, Reading};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{
-    Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, reconstruct,
+    Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, Side,
+    reconstruct,
 };
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -284,8 +287,8 @@ pub struct Source {
     pub reference: Option<Image>,
     /// The account of a recording's frames.
     pub frames: Option<LossCounters>,
-    /// Whether no real light was measured; `None` if that is not known.
-    pub simulated: Option<bool>,
+    /// Where the readings come from.
+    pub taken: Taken,
     /// What contradicts the readings, one line each: the image may not be of the scene.
     pub warnings: Vec<String>,
     /// Notes for the user.
@@ -298,10 +301,7 @@ impl Source {
     /// Corrects a reconstructed image by the flat field, if there is one.
     #[must_use]
     pub fn flattened(&self, image: Image) -> Image {
-        match &self.flat_field {
-            Some(flat) => flat.correct(&image),
-            None => image,
-        }
+        FlatField::corrected(self.flat_field.as_ref(), image)
     }
 
     /// The same measurements with the flat field of their camera.
@@ -357,7 +357,7 @@ impl Source {
     /// # Errors
     /// [`IntegrateError`] if its frames give no measurements.
     pub fn of_capture(capture: &Capture) -> Result<Self, IntegrateError> {
-        let Capture { setup, settling, integrated, counters, .. } = capture;
+        let Capture { camera, setup, settling, integrated, counters, .. } = capture;
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
         notes.extend(capture.missing().as_deref().map(not_whole));
@@ -371,7 +371,7 @@ impl Source {
             not_read: Vec::new(),
             reference: None,
             frames: Some(*counters),
-            simulated: None,
+            taken: Taken::by(camera),
             warnings: read.doubts.iter().map(Doubt::to_string).collect(),
             notes,
             flat_field: None,
@@ -401,6 +401,42 @@ fn not_whole(missing: &str) -> String {
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
 
 impl SourceOptions {
+    /// The options as data, for keys: each option by its name (`key::the_key_of_options_is_frozen`).
+    #[must_use]
+    pub fn key(&self) -> Value {
+        let Self { index, detector, file, part, keep_leak, no_flat_field } = self;
+        // The index of a file is that of these options.
+        let Selection {
+            index: _,
+            form,
+            field,
+            patterns_first,
+            side,
+            shown,
+            transpose,
+            decimal_comma,
+        } = file;
+        let of_index = |index: &Option<Index>| match index {
+            None => Value::Null,
+            Some(Index::One(index)) => (*index).into(),
+            Some(Index::All) => "all".into(),
+        };
+        json!({
+            "index": of_index(index),
+            "detector": of_index(detector),
+            "form": form.map(Form::name),
+            "field": field,
+            "patterns_first": patterns_first,
+            "side": side.map(Side::pixels),
+            "shown": shown.as_ref().map(Order::to_string),
+            "transpose": transpose,
+            "decimal_comma": decimal_comma,
+            "part": part.name(),
+            "keep_leak": keep_leak,
+            "no_flat_field": no_flat_field,
+        })
+    }
+
     /// The requested index.
     ///
     /// # Errors
@@ -496,7 +532,8 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         }
     });
     let not_read = file.not_read;
-    let (frames, simulated, flat_field) = (None, file.simulated, None);
+    let taken = Taken::of_file(path, file.simulated);
+    let (frames, flat_field) = (None, None);
     Ok(Source {
         measurements: read.measurements,
         imaginary,
@@ -505,7 +542,7 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         not_read,
         reference,
         frames,
-        simulated,
+        taken,
         warnings,
         notes,
         flat_field,
@@ -573,6 +610,36 @@ fn as_they_are(rows: &Rows, readings: &Readings) -> Result<Reading, MeasurementE
     };
     let (dropouts, outliers, doubts) = (Vec::new(), Vec::new(), Vec::new());
     Ok(Reading { measurements, dropouts, outliers, doubts, dark_level })
+}
+
+#[cfg(test)]
+mod key {
+    use super::*;
+
+    #[test]
+    fn the_key_of_options_is_frozen() {
+        let options = SourceOptions {
+            index: Some(Index::All),
+            file: Selection { form: Some(Form::Halves), ..Selection::default() },
+            part: Part::Real,
+            ..SourceOptions::default()
+        };
+        let frozen = json!({
+            "index": "all",
+            "detector": null,
+            "form": "halves",
+            "field": null,
+            "patterns_first": false,
+            "side": null,
+            "shown": null,
+            "transpose": false,
+            "decimal_comma": false,
+            "part": "real",
+            "keep_leak": false,
+            "no_flat_field": false,
+        });
+        assert_eq!(options.key(), frozen);
+    }
 }
 
 #[cfg(all(test, feature = "training"))]

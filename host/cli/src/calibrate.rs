@@ -3,9 +3,9 @@
 
 use super::address;
 use super::camera::{CameraArgs, ModelArgs, SceneArgs};
-use super::print;
 use super::progress::Progress;
 use super::report::ReportArgs;
+use super::{print, provenance};
 use anyhow::{Context, Result, anyhow};
 use nirspi::calibration::{
     KeptCalibration, KeptFlatField, Settling, Sweeps, calibrate, flat_field_path_of, measure_dark,
@@ -112,7 +112,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let summary = flat_field.as_ref().map(|(flat, _)| flat.summary());
     let flat_field = flat_field.map(|(flat, file)| FlatFieldReport::new(&flat, file));
     let report = Report { kept, file, flat_field };
-    args.report.print(&report, |report| say(report, summary))
+    let provenance = provenance::of_camera(&report.kept.camera);
+    args.report.print(&report, &provenance, |report| say(report, summary))
 }
 
 fn say(report: &Report, flat_field: Option<impl std::fmt::Display>) -> Result<()> {
@@ -178,7 +179,8 @@ fn run_dark(args: &Args) -> Result<ExitCode> {
         kept.renewed(flat.with_context(|| format!("{}: no dark frame", args.camera.camera))?);
     let file = flat_field_path_of(&camera.serial)?;
     kept.write(&file)?;
-    args.report.print(&FlatFieldReport::new(&kept, file), |dark| {
+    let provenance = provenance::of_camera(&camera);
+    args.report.print(&FlatFieldReport::new(&kept, file), &provenance, |dark| {
         print::line(format_args!(
             "dark frame: {} of 1024 pixels read something without light, beyond noise; kept in {}",
             dark.dark_pixels.unwrap_or(0),

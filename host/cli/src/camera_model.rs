@@ -35,7 +35,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let report = camera_model(&camera)?;
-    args.report.print(&report, say)
+    args.report.print_answer(&report, say)
 }
 
 /// The shipped file of this name, if the file is complete. Other shipped files have only the

@@ -3,7 +3,7 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::report::ReportArgs;
-use super::{Usage, address, print, progress, stop_on_signal};
+use super::{Usage, address, print, progress, provenance, stop_on_signal};
 use anyhow::Result;
 use nirspi::calibration::Origin;
 use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, observe};
@@ -131,7 +131,7 @@ fn target(args: &Args) -> Result<Target> {
 
 fn say(args: &Args, report: &CaptureReport<'_>) -> Result<ExitCode> {
     let (frames, path) = (report.frames, report.recording.display());
-    args.report.print(report, |report| {
+    args.report.print(report, &provenance::of_camera(report.camera), |report| {
         if let Some(note) = report.calibration_note {
             print::note(note)?;
         }

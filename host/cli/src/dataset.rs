@@ -4,7 +4,7 @@ use super::camera::{ModelArgs, parse_order};
 use super::method::MethodArgs;
 use super::reconstruct::FolderArgs;
 use super::report::ReportArgs;
-use super::{Usage, print};
+use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::archive::{Grid, GridAxes, write_file};
 use nirspi::source::FirstPatterns;
@@ -76,7 +76,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             anyhow::Error::from(error)
         }
     })?;
-    let (report, code) = args.folder.run(&grid, &options, "measurements", args.report)?;
+    let (report, code) =
+        args.folder.run(&grid, &options, "measurements", args.report, &provenance::simulated())?;
     write_file(&args.out.with_extension("md"), grid.card(&report).as_bytes())?;
     if !args.report.json {
         let card = report.out.with_extension("md");

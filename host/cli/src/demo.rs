@@ -4,7 +4,8 @@ use super::camera::{SceneArgs, SetupArgs};
 use super::method::{MethodArgs, Solved, solve};
 use super::print;
 use super::progress::Progress;
-use super::report::{ReportArgs, StageTimes, stages, to_json};
+use super::provenance;
+use super::report::{ReportArgs, StageTimes, stages};
 use anyhow::Result;
 use nirspi::account::LossCounters;
 use nirspi::files::image::encode_grey;
@@ -156,7 +157,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         method: &method,
         stages: &stages,
     };
-    let pictures = panels.pictures();
+    let provenance = provenance::of_camera(&camera);
+    let pictures = panels.pictures(&provenance);
     let report = Report {
         scene: map.name.clone(),
         simulated: true,
@@ -190,7 +192,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let images = Images { map: &map, truth, raw, fitted, measurements, stages: &stages };
     write(args, &images, &report)?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
 /// The images of the report's stages.
@@ -207,9 +209,10 @@ fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
     let (map, stages) = (images.map, images.stages);
     let side = images.measurements.rows().side().pixels();
     let grid = [side, side];
+    let provenance = report.pictures.provenance();
     let mut out = OutputDir::create(&args.out)?;
     let scene = &map.reflectance;
-    out.write("scene.png", &encode_grey(map.size_px, map.size_px, scene))?;
+    out.write("scene.png", &encode_grey(map.size_px, map.size_px, scene, provenance))?;
     out.write("scene.npy", &npy::encode(&[map.size_px, map.size_px], scene))?;
     out.write("truth.npy", &npy::encode(&grid, &images.truth))?;
     out.write("raw.npy", &npy::encode(&grid, &images.raw.values))?;
@@ -217,7 +220,8 @@ fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
     // The input of `enhance` and `reconstruct`.
     out.write("frames.npy", &npy::encode(&[1, side, side], &images.fitted.values))?;
     let measurement = args.out.join("measurement.npz");
-    out.write("measurement.npz", &encode_measurement(&measurement, &images.measurements, true)?)?;
+    let measured = encode_measurement(&measurement, &images.measurements, provenance)?;
+    out.write("measurement.npz", &measured)?;
     out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &stages.truth))?;
     for (name, image) in
         [("upscaled", &stages.upscaled), ("fused", &stages.fused), ("deblurred", &stages.deblurred)]
@@ -228,7 +232,7 @@ fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
         out.write("interval.npy", &npy::encode(&[2 * side, 2 * side], half_width))?;
     }
     report.pictures.write(&mut out)?;
-    out.write("report.json", to_json(report)?.as_bytes())?;
+    out.write("report.json", provenance.sign(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
 }

@@ -4,6 +4,7 @@ use super::deblur::{Sharpening, in_steps};
 use super::networks::{ImageArgs, checked};
 use super::print;
 use super::progress::Progress;
+use super::provenance::made;
 use super::report::{stages, words};
 use super::upscale::DepthArgs;
 use anyhow::Result;
@@ -75,6 +76,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
     let target = input.target(&args.images.out)?;
+    let provenance = input.taken()?.made(made());
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let enhancer = times.time("load", || networks.enhancer(method))?;
@@ -92,16 +94,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         enhancer.enhance(images, depth.as_ref(), &options, &mut |done| bar.set(done))
     })?;
     drop(bar);
-    args.sharpening.write_spread(&input, result.spread.as_deref())?;
+    args.sharpening.write_spread(&input, result.spread.as_deref(), &provenance)?;
     if let (Some(file), Some(intervals), Some(readings)) = (wanted, intervals, readings) {
-        input.target(file)?.write(2 * fusion::SIDE, &intervals.of(&result, &readings)?)?;
+        let shown = intervals.of(&result, &readings)?;
+        input.target(file)?.write(2 * fusion::SIDE, &shown, &provenance)?;
     }
-    let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced")?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced", &provenance)?;
 
     let steps = args.steps.get();
     let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);
     let report = args.images.report(&input, &networks, Some(deblurring), shown, times);
-    args.images.report.print(&report, say)
+    args.images.report.print(&report, &provenance, say)
 }
 
 /// The report in two lines.

@@ -8,11 +8,13 @@ mod table3;
 mod table4;
 
 use super::camera::{ModelArgs, Rain, WeatherArgs};
+use super::provenance;
 use super::range;
-use super::report::{ReportArgs, to_json};
+use super::report::ReportArgs;
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use nirspi::files::output::OutputDir;
+use nirspi::picture::{RgbImage, signed_png};
 use nirspi::virtual_camera::CameraModel;
 use nirspi_eval::pictures::ANCESTRAL_STEPS;
 use nirspi_eval::shot;
@@ -113,15 +115,16 @@ impl OutputArgs {
         &self,
         name: &str,
         report: &R,
-        picture: impl FnOnce() -> Result<Vec<u8>>,
+        picture: impl FnOnce() -> Result<RgbImage>,
         say: impl FnOnce(&R) -> Result<()>,
     ) -> Result<ExitCode> {
+        let provenance = provenance::simulated();
         if let Some(path) = &self.out {
             let mut out = OutputDir::create(path)?;
-            out.write(&format!("{name}.json"), to_json(report)?.as_bytes())?;
-            out.write(&format!("{name}.png"), &picture()?)?;
+            out.write(&format!("{name}.json"), provenance.sign(report)?.as_bytes())?;
+            out.write(&format!("{name}.png"), &signed_png(&picture()?, &provenance))?;
             out.commit()?;
         }
-        self.report.print(report, say)
+        self.report.print(report, &provenance, say)
     }
 }

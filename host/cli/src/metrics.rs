@@ -2,7 +2,7 @@
 
 use super::progress::Progress;
 use super::report::ReportArgs;
-use super::{print, refused};
+use super::{print, provenance, refused};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use nirspi_eval::Fid;
@@ -80,6 +80,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         sets::compare(&reference, &test, &options, &|| bar.add(1)).with_context(named)?;
     drop(bar);
     let align = if args.align.is_some() { "gain-offset" } else { "none" };
-    print::json(&Report { align, data_range, comparison })?;
+    print::json(&Report { align, data_range, comparison }, &provenance::computed())?;
     Ok(ExitCode::SUCCESS)
 }

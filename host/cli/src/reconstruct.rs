@@ -9,6 +9,7 @@ pub use archive::FolderArgs;
 use super::camera::parse_order;
 use super::method::MethodArgs;
 use super::progress::Progress;
+use super::provenance::made;
 use super::report::{ReportArgs, StageTimes, stages};
 use super::source::SourceArgs;
 use super::{Usage, print};
@@ -98,9 +99,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let source = times.time("read", || args.source.load())?;
     let solver = args.method.solver(first, args.sampling)?;
     let (input, enhance, out) = (&*args.source.input, args.enhance, &*args.out);
-    let request = OneImage { input, solver: &solver, enhance, out };
+    let made = made();
+    let request = OneImage { input, solver: &solver, enhance, out, made };
     let report = one_image(&request, source, times)?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
 }
 
 /// Reconstructs and enhances the frames of a capture as one image. The folder `out` gets the files
@@ -112,7 +114,8 @@ pub fn picture(
     out: &Path,
 ) -> Result<Vec<String>> {
     let solver = MethodArgs::default().solver(FirstPatterns::LowestSequencies, Sampling::ALL)?;
-    let request = OneImage { input: recording, solver: &solver, enhance: true, out };
+    let made = made();
+    let request = OneImage { input: recording, solver: &solver, enhance: true, out, made };
     let mut source = Source::of_capture(captured)?;
     if let Some(kept) = flat_field {
         source = source.with_flat_field(kept);

@@ -3,6 +3,7 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
+use super::provenance::made;
 use super::{Usage, address, print, stop_on_signal};
 use anyhow::{Context, Result, bail};
 use nirspi::calibration::Choice;
@@ -75,7 +76,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(folder) = args.record_to.as_ref().filter(|folder| !folder.is_dir()) {
         bail!("--record-to {}: found no such folder", folder.display());
     }
-    let mut server = Server::bind(&args.listen, args.token.clone())
+    let mut server = Server::bind(&args.listen, args.token.clone(), made())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     if let Some(place) = &args.foxglove {
         let problem = || format!("--foxglove {place}: cannot listen there");

@@ -16,7 +16,8 @@ use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma};
 use natural::Scenes;
 use nirspi::files::characters;
-use nirspi::files::image::encode_rgb;
+use nirspi::picture::signed_png;
+use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::trust::{NATURAL, Report, Settings, calibrate, judge};
 use nirspi_nets::Intervals;
 use nirspi_nets::data::{Kind, Stack};
@@ -34,6 +35,12 @@ const SEED: u64 = 1;
 const COUNTS: [usize; 2] = [55, 30];
 /// Side of a part of a scene.
 const SIDE: usize = 64;
+
+/// The provenance of the pictures: scenes are simulated.
+fn provenance() -> Provenance {
+    let made = Made::now("trust", None, std::env::args());
+    Taken::without_camera(Origin::Simulated).made(&made)
+}
 
 fn main() -> Result<()> {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
@@ -64,7 +71,7 @@ fn main() -> Result<()> {
             let judged = judge(&settings, &intervals, &progress)?;
             std::fs::create_dir_all(&out)?;
             for (name, picture) in &judged.pictures {
-                std::fs::write(out.join(name), encode_rgb(picture))?;
+                std::fs::write(out.join(name), signed_png(picture, &provenance()))?;
             }
             std::fs::write(out.join("trust.json"), serde_json::to_string_pretty(&judged.report)?)?;
             say(&judged.report);

@@ -252,6 +252,23 @@ pub enum ReconstructError {
         /// The method.
         method: Method,
     },
+    /// The method completes measurements by a network, and the settings hold none.
+    #[error("the method {method} needs a network: give it one, or choose another method")]
+    NeedsNetwork {
+        /// The method.
+        method: Method,
+    },
+    /// The network does not complete images of this side.
+    #[error(
+        "the network {network} does not complete images of {side} x {side} pixels: choose another method, such as {}",
+        Method::TIKHONOV
+    )]
+    NetworkSide {
+        /// The network's name.
+        network: String,
+        /// Side of the images.
+        side: usize,
+    },
     /// The pursuit refused the problem.
     #[error(transparent)]
     Pursuit(#[from] OmpError),

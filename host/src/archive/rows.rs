@@ -163,7 +163,7 @@ impl RowReader {
             _ => Source::read_all(path, &self.source)?,
         };
         let row = |source: Source| {
-            let row = Row { simulated: source.simulated, ..row_of(&source.measurements) };
+            let row = Row { simulated: source.taken.simulated(), ..row_of(&source.measurements) };
             (row, source)
         };
         Ok(sources.into_iter().map(row).collect())
@@ -263,7 +263,7 @@ impl Work for ImageFiles {
 
     fn settings(&self) -> Map<String, Value> {
         let mut settings = self.reader.solver.settings();
-        settings.insert("input".to_owned(), format!("{:?}", self.reader.source).into());
+        settings.insert("input".to_owned(), self.reader.source.key());
         settings.insert("enhance".to_owned(), self.reader.enhances().into());
         settings
     }

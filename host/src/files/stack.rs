@@ -6,10 +6,13 @@
 //! first (`host/cli/tests/cli/enhance.rs`).
 
 use super::FileError;
-use super::image::{FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, read_grey};
+use super::image::{
+    FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, provenance_of, read_grey,
+};
 use super::npy;
 use super::output::{OutputDir, write_atomic};
 use crate::picture::{Panel, Pictures, Sheet, SideBySide, Unit};
+use crate::provenance::{Provenance, Taken};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -160,6 +163,33 @@ impl ImageStack {
         &self.path
     }
 
+    /// Where the images come from: what a picture of this program says of itself, and else an unknown
+    /// camera. Several pictures are of one origin only if all say the same.
+    ///
+    /// # Errors
+    /// [`StackError::File`] if a picture states a damaged provenance.
+    pub fn taken(&self) -> Result<Taken> {
+        let unknown = Taken::of_file(&self.path, None);
+        let Form::Pictures(_) = &self.form else { return Ok(unknown) };
+        let files = match self.path.is_dir() {
+            true => pictures_in(&self.path)?,
+            false => vec![self.path.clone()],
+        };
+        let mut all = Vec::with_capacity(files.len());
+        for file in files.iter().filter(|file| has_extension(file, "png")) {
+            all.push(provenance_of(file)?.map(|found| found.taken));
+        }
+        Ok(match all.first().cloned().flatten() {
+            Some(first) if all.len() == files.len() => {
+                match all.iter().all(|taken| taken.as_ref() == Some(&first)) {
+                    true => first,
+                    false => unknown,
+                }
+            }
+            _ => unknown,
+        })
+    }
+
     /// The values of the images, row-major, one after another.
     ///
     /// # Errors
@@ -233,17 +263,19 @@ impl StackTarget {
     ///
     /// # Errors
     /// [`StackError::File`] if the images cannot be written.
-    pub fn write(&self, side: usize, values: &[f32]) -> Result<()> {
+    pub fn write(&self, side: usize, values: &[f32], provenance: &Provenance) -> Result<()> {
         match &self.kind {
             Kind::Array(Some(count)) => {
                 write_atomic(&self.path, &npy::encode(&[*count, side, side], values))?;
             }
             Kind::Array(None) => write_atomic(&self.path, &npy::encode(&[side, side], values))?,
-            Kind::Picture => write_atomic(&self.path, &encode_grey(side, side, values))?,
+            Kind::Picture => {
+                write_atomic(&self.path, &encode_grey(side, side, values, provenance))?
+            }
             Kind::Folder(names) => {
                 let mut folder = OutputDir::create(&self.path)?;
                 for (name, image) in names.iter().zip(values.chunks_exact(side * side)) {
-                    folder.write(name, &encode_grey(side, side, image))?;
+                    folder.write(name, &encode_grey(side, side, image, provenance))?;
                 }
                 folder.commit()?;
             }
@@ -256,15 +288,21 @@ impl StackTarget {
     ///
     /// # Errors
     /// [`StackError::File`] if the images or the picture cannot be written.
-    pub fn write_and_show(&self, side: usize, values: &[f32], title: &str) -> Result<Pictures> {
-        self.write(side, values)?;
+    pub fn write_and_show(
+        &self,
+        side: usize,
+        values: &[f32],
+        title: &str,
+        provenance: &Provenance,
+    ) -> Result<Pictures> {
+        self.write(side, values, provenance)?;
         let name = match self.kind {
             Kind::Folder(_) => self.path.file_name(),
             Kind::Array(_) | Kind::Picture => self.path.file_stem(),
         };
         let name = name.map_or_else(|| "images".into(), |name| name.to_string_lossy());
         let file = self.path.with_file_name(format!("{name}{FOR_PEOPLE}"));
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(provenance);
         let named = file.display().to_string();
         match &self.input {
             Shown::Single(input) => {

@@ -24,7 +24,7 @@ mod white;
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COPIES, White};
 #[cfg(feature = "enhance")]
-pub use frames::{FrameReport, FramesError, enhance_frames, enhance_frames_by};
+pub use frames::{FrameReport, FramesError, enhance_frame, enhance_frames, enhance_frames_by};
 pub use method_report::MethodReport;
 pub use quality::{Fit, Fitted, Quality, compare};
 #[cfg(feature = "enhance")]
@@ -33,4 +33,4 @@ pub use readings::KnownReadings;
 pub use stack_report::{Deblurring, StackReport};
 #[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};
-pub use white::{SteadyWhite, brightest};
+pub use white::SteadyWhite;

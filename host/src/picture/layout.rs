@@ -9,9 +9,11 @@
 
 use super::bar::{self, draw_bar};
 use super::scale::{PERCENTILES, Range, Scale, Unit};
+use super::signature::signed;
 use super::text::{Block, Font, Style};
 use super::{AMBER, BRIGHT, DIM, FRAME, GROUND, MIDDLE};
 use crate::files::image::{Placed, encode_labelled, to_level};
+use crate::provenance::Provenance;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 
@@ -121,7 +123,7 @@ impl From<Panel> for SideBySide {
 }
 
 impl SideBySide {
-    /// Draws the picture; [`encode_rgb`](crate::files::image::encode_rgb) makes a PNG of it.
+    /// Draws the picture without its provenance; [`signed_png`](super::signed_png) makes a PNG of it.
     ///
     /// # Panics
     /// If there is no panel, or a panel does not have exactly `width * height` values, at least
@@ -137,15 +139,15 @@ impl SideBySide {
         self.draw(panel_px).0
     }
 
-    /// The picture as a PNG. Readers of this program find the image of a single panel in the
-    /// picture, and refuse a picture of several.
+    /// The picture as a PNG, with its provenance below it. Readers of this program find the image of
+    /// a single panel in the picture, and refuse a picture of several.
     ///
     /// # Panics
     /// As [`render`](Self::render).
     #[must_use]
-    pub fn png(&self) -> Vec<u8> {
+    pub fn png(&self, provenance: &Provenance) -> Vec<u8> {
         let (picture, placed) = self.draw(PANEL_PX);
-        encode_labelled(&picture, self.panels.len(), placed)
+        encode_labelled(&signed(&picture, provenance), self.panels.len(), placed, provenance)
     }
 
     /// Rows of the picture.

@@ -20,6 +20,7 @@ mod layout;
 mod report;
 mod scale;
 mod sheet;
+mod signature;
 mod terminal;
 mod text;
 mod ticks;
@@ -31,8 +32,11 @@ pub use layout::{Panel, SideBySide, below, beside, blank, stacked};
 pub use report::Pictures;
 pub use scale::{PERCENTILES, Range, Scale, Unit};
 pub use sheet::Sheet;
+pub use signature::signed_png;
 pub use terminal::{Tones, half_blocks};
 pub(crate) use video::of_images as video;
+
+pub use image::RgbImage;
 
 use image::Rgb;
 

@@ -6,6 +6,7 @@ use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
 use crate::imaging::{FrameReport, FramesError, MethodReport, enhance_frames};
 use crate::picture::{Pictures, Unit};
+use crate::provenance::Made;
 use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
 use nirspi_recon::words::count_of;
@@ -24,6 +25,8 @@ pub struct OneImage<'r> {
     pub enhance: bool,
     /// Folder for the results.
     pub out: &'r Path,
+    /// The program, for the provenance of the results.
+    pub made: &'r Made,
 }
 
 /// Readings that were lost.
@@ -168,8 +171,9 @@ pub fn one_image(
         readings: d.length,
         rows: d.rows,
     });
+    let provenance = source.taken.made(request.made);
     let report = OneReport {
-        pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short)),
+        pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short), &provenance),
         input: request.input.to_owned(),
         n: side,
         measurements: source.measurements.rows().len(),
@@ -193,7 +197,7 @@ pub fn one_image(
 }
 
 /// Writes an image, the real and imaginary part of a complex image, the enhanced image, if there is
-/// one, the pictures, and the report.
+/// one, the pictures, and the report with the provenance of the pictures.
 ///
 /// # Errors
 /// [`FileError`] names the file. Nothing is left behind.
@@ -216,8 +220,8 @@ pub fn write_image(
         out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
     }
     pictures.write(&mut out)?;
-    let text = serde_json::to_string_pretty(report).unwrap_or_default();
-    out.write("report.json", format!("{text}\n").as_bytes())?;
+    let text = pictures.provenance().sign(report).unwrap_or_default();
+    out.write("report.json", text.as_bytes())?;
     out.commit()?;
     Ok(())
 }

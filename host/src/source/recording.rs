@@ -3,10 +3,10 @@
 use super::several::fits_together;
 use super::{NOT_CALIBRATED, Source, SourceError, SourceOptions, first_of, not_whole};
 use crate::account::{LossAccount, LossCounters};
-use crate::boards;
 use crate::calibration::KeptFlatField;
 use crate::causes;
 use crate::integrate::Integrated;
+use crate::provenance::Taken;
 use crate::recording::{End, Recording};
 use crate::tally::{self, Tally, tally_recording};
 use std::path::Path;
@@ -121,7 +121,7 @@ fn of_frames(
         not_read,
         reference,
         frames,
-        simulated: Some(boards::is_simulated(&recording.identity.board)),
+        taken: Taken::by(&recording.identity).from_file(path),
         warnings: read.doubts.iter().map(ToString::to_string).collect(),
         notes,
         flat_field,

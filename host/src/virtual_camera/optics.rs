@@ -3,7 +3,7 @@
 use super::{OpticalFpga, VirtualCamera};
 use crate::scene::SceneMap;
 use crate::setup::MeasurementSetup;
-use nirspi_optics::camera::fnv1a;
+use nirspi_optics::camera::{canonical, fnv1a};
 use nirspi_optics::rain::{Air, BeamShadows, RainError, RainySpots, Weather};
 use nirspi_optics::{
     Budget, BudgetError, CameraModel, Chain, ChainError, ChainSettings, DepthError, DepthView,
@@ -184,7 +184,7 @@ impl VirtualOptics {
             // settling.
             let chain =
                 ChainSettings { electrons_per_count: 1.0, ambient_electrons: 0.0, ..*chain };
-            format!("{camera:?} {chain:?}")
+            canonical(&camera) + &canonical(&chain)
         };
         let this = instrument(&self.camera, &self.chain);
         if this == instrument(CameraModel::paper(), &ChainSettings::default()) {
@@ -411,6 +411,14 @@ mod tests {
             assert!(serial.starts_with("virtual-3-") && !serials.contains(&serial), "{serial}");
             serials.push(serial);
         }
+    }
+
+    /// Kept calibrations on disk bear this serial number.
+    #[test]
+    fn the_serial_number_of_a_described_camera_is_frozen() {
+        let camera = CameraModel::parse("[adc]\nlatency_clocks = 9").unwrap();
+        let optics = VirtualOptics::of(&camera, Scene::white(), 300.0).unwrap();
+        assert_eq!(optics.serial(1), "virtual-1-884f6b2b");
     }
 
     #[test]

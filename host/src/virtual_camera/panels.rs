@@ -5,6 +5,7 @@ use super::{Stages, VirtualOptics};
 use crate::capture::Capture;
 use crate::imaging::{Fitted, MethodReport, Quality};
 use crate::picture::{Panel, Pictures, Range, SideBySide, Unit};
+use crate::provenance::Provenance;
 use crate::scene::SceneMap;
 use nirspi_nets::{deblur, fusion};
 
@@ -38,8 +39,8 @@ pub struct Panels<'a> {
 impl Panels<'_> {
     /// `side_by_side.png`, and each image from the raw one on as a picture of its own.
     #[must_use]
-    pub fn pictures(&self) -> Pictures {
-        let mut pictures = Pictures::default();
+    pub fn pictures(&self, provenance: &Provenance) -> Pictures {
+        let mut pictures = Pictures::new(provenance);
         let mut all = self.side_by_side();
         pictures.add("side_by_side.png", &all);
         all.panels.push(panel("upscaled", deblur::SIDE, &self.stages.upscaled, Vec::new()));

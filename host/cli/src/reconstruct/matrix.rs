@@ -2,11 +2,13 @@
 
 use super::{Args, print, spinning};
 use crate::Usage;
+use crate::provenance::made;
 use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::measurement::{Plain, Selection, read_plain};
 use nirspi::files::npy;
 use nirspi::picture::{Pictures, Unit};
+use nirspi::provenance::Taken;
 use nirspi::reconstruct::{check_finite, not_read_words, read_atoms, write_image};
 use nirspi_recon::reconstruct::{DarkLevel, MatrixSettings, Method, OwnMatrix, Setting};
 use nirspi_recon::words::count_of;
@@ -91,6 +93,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         Some(path) => path.display().to_string(),
         None => settings.basis.to_string(),
     };
+    let provenance = Taken::of_file(&args.source.input, None).made(made());
     let report = Report {
         input: args.source.input.clone(),
         matrix: path.to_owned(),
@@ -108,11 +111,11 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         relative_residual: found.residual,
         not_read,
         notes,
-        pictures: Pictures::of_image(&found.image, Unit::Readings, None),
+        pictures: Pictures::of_image(&found.image, Unit::Readings, None, &provenance),
         stage_ms: times,
     };
     write_image(&args.out, &found.image, None, None, &report.pictures, &report)?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
 fn settings(args: &Args) -> Result<MatrixSettings> {

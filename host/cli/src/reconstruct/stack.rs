@@ -4,7 +4,8 @@
 use super::{Args, print, spinning};
 use crate::Usage;
 use crate::method::Solved;
-use crate::report::{StageTimes, stages, to_json};
+use crate::provenance::made;
+use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
@@ -78,6 +79,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let mut others = others.into_iter();
     let (mut images, mut frames) = (Vec::new(), Vec::new());
     let unit = Unit::of_readings(sources[0].frames.is_some());
+    let provenance = sources[0].taken.made(made());
     for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
         let warm = made.report.warm;
         let Solved { mut image, report } = args.method.solved(made);
@@ -123,7 +125,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let short = |at: &usize| frames[*at].enhancement.as_ref().is_some_and(|e| !e.short.is_empty());
     let warned = (0..frames.len()).filter(short).collect();
     let sharp_and_warned = sharp.as_deref().map(|sharp| (sharp, warned));
-    let pictures = Pictures::of_video(&named(), &images, unit, sharp_and_warned);
+    let pictures = Pictures::of_video(&named(), &images, unit, sharp_and_warned, &provenance);
     let report = Report {
         input: args.source.input.clone(),
         n,
@@ -141,9 +143,9 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         out.write("enhanced.npy", &npy::encode(&[images.len(), side, side], &sharp))?;
     }
     report.pictures.write(&mut out)?;
-    out.write("report.json", to_json(&report)?.as_bytes())?;
+    out.write("report.json", provenance.sign(&report)?.as_bytes())?;
     out.commit()?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
 /// The image of each frame.

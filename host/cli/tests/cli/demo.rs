@@ -1,6 +1,6 @@
 //! `nirspi demo`.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
 
 const FILES: [&str; 20] = [
@@ -103,7 +103,7 @@ fn a_seed_gives_the_same_image_and_another_seed_another() {
 fn a_picture_fills_the_field() {
     let bench = Bench::new();
     let half: Vec<f32> = (0..64 * 64).map(|p| if p % 64 < 32 { 0.9 } else { 0.1 }).collect();
-    bench.write("half.png", &encode_grey(64, 64, &half));
+    bench.write("half.png", &encode_grey(64, 64, &half, &provenance()));
     bench.run(&["demo", "--scene", "half.png", "--out", "demo"]).succeeded();
     let pixels = bench.pixels("demo/reconstruction.npy");
     let mean = |columns: std::ops::Range<usize>| {

@@ -1,6 +1,6 @@
 //! `nirspi upscale`, `deblur` and `enhance`. That the networks compute what they should is tested in `nirspi-nets`.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 use std::ops::Range;
@@ -95,7 +95,7 @@ fn a_single_image_stays_one_and_bytes_are_grey_levels() {
     file[descr..descr + 3].copy_from_slice(b"|u1");
     file.extend(&levels);
     bench.write("bytes.npy", &file);
-    bench.write("in.png", &encode_grey(32, 32, &bar(32)));
+    bench.write("in.png", &encode_grey(32, 32, &bar(32), &provenance()));
     bench.run(&["upscale", "bytes.npy", "--out", "from_bytes.npy"]).succeeded();
     bench.run(&["upscale", "in.png", "--out", "from_png.npy"]).succeeded();
     assert_eq!(bench.pixels("from_bytes.npy"), bench.pixels("from_png.npy"));
@@ -109,7 +109,7 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
     let bench = Bench::new();
     std::fs::create_dir(bench.path("in")).unwrap();
     for name in ["b.png", "a.png"] {
-        bench.write(&format!("in/{name}"), &encode_grey(64, 64, &bar(64)));
+        bench.write(&format!("in/{name}"), &encode_grey(64, 64, &bar(64), &provenance()));
     }
     bench.write("in/notes.txt", b"not a picture");
     bench.run(&["deblur", "in", "--steps", "2", "--out", "sharp"]).succeeded();
@@ -122,7 +122,7 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
     // `*.picture.png` is written beside the folder, for people to look at. In a folder of images it is not read.
     std::fs::copy(bench.path("sharp.picture.png"), bench.path("in/sharp.picture.png")).unwrap();
     bench.run(&["deblur", "in", "--out", "sharper"]).succeeded();
-    bench.write("in/c.png", &encode_grey(32, 32, &bar(32)));
+    bench.write("in/c.png", &encode_grey(32, 32, &bar(32), &provenance()));
     bench
         .run(&["deblur", "in", "--out", "again"])
         .failed(1, &["c.png", "32 x 32", "64 x 64", "a.png"]);

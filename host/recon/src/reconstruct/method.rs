@@ -29,7 +29,7 @@ use thiserror::Error;
 /// nirspi_recon::fwht(&mut scene)?;
 /// let all = Measurements::from_differential(&Rows::natural(side), &scene)?;
 /// let part = all.take(Some(&Order::ZigZag), 0.3)?;
-/// for method in Method::ALL {
+/// for method in Method::ALL.iter().filter(|method| !method.needs_network()) {
 ///     let found = method.prepare(&MethodSettings::default())?.reconstruct(&part)?;
 ///     println!("{}", found.report);
 /// }
@@ -156,7 +156,8 @@ impl Method {
     /// Tikhonov's method, with a covariance prior.
     pub const TIKHONOV: Self = methods::TIKHONOV;
 
-    /// The learned prior, which needs [`MethodSettings::network`].
+    /// The learned prior, which needs [`MethodSettings::network`]; `nirspi_nets::prior::settings`
+    /// has the shipped one.
     pub const PRIOR: Self = methods::PRIOR;
 
     /// The method's name in a few words, for example `total variation`.
@@ -177,6 +178,13 @@ impl Method {
         self.0.about
     }
 
+    /// Whether the method needs [`MethodSettings::network`], without which
+    /// [`prepare`](Self::prepare) is an error.
+    #[must_use]
+    pub fn needs_network(self) -> bool {
+        self == Self::PRIOR
+    }
+
     /// Whether the method uses a setting.
     #[must_use]
     pub fn takes(self, setting: Setting) -> bool {
@@ -194,7 +202,7 @@ impl Method {
     ///
     /// # Errors
     /// [`ReconstructError`] if a setting is out of range, belongs to another method, or names a GPU
-    /// that is missing.
+    /// that is missing, and if the method needs a network and the settings hold none.
     pub fn prepare(
         self,
         settings: &MethodSettings,
@@ -328,8 +336,8 @@ pub struct MethodSettings {
     pub strength: Strength,
     /// The backend.
     pub backend: Backend,
-    /// The learned prior's network. Other methods ignore it. `nirspi_nets::prior::shipped` is the
-    /// shipped one; without any, `prior` is Tikhonov's method, and its report says so.
+    /// The learned prior's network. Other methods ignore it. `nirspi_nets::prior::settings` gives
+    /// settings that hold the shipped one; without any, [`Method::PRIOR`] cannot be prepared.
     pub network: Option<SharedNetwork>,
 }
 

@@ -15,8 +15,9 @@
 //! Whatever the network gives, a measured coefficient of the image differs from its measurement by
 //! at most [`WITHIN`](super::WITHIN) times the noise (`tests::measured_values_stay_within_their_noise`), gain and
 //! offset of the measurements are those of the image (`tests::gain_and_offset_go_through`), and
-//! measurements that the network cannot take give Tikhonov's image and a line that says so
-//! (`tests::what_the_network_cannot_take_is_tikhonov_and_says_so`).
+//! measurements with too few patterns or without contrast give Tikhonov's image and a line that says
+//! so (`tests::what_the_network_cannot_complete_is_tikhonov_and_says_so`). A side that the network
+//! does not complete is an error (`tests::a_side_that_the_network_does_not_take_is_an_error`).
 
 mod seen;
 
@@ -89,18 +90,24 @@ impl PartialEq for SharedNetwork {
 }
 
 /// Reconstructs an image with a network, as far as held-back measurements support the network.
-/// Without a network, or where the network cannot be used, the image is Tikhonov's, and
-/// [`Report::note`] says why.
+/// Where the patterns are too few, show no contrast or do not support the network, the image is
+/// Tikhonov's, and [`Report::note`] says why.
 ///
 /// # Errors
+/// [`ReconstructError::NetworkSide`] if the network does not complete images of this side, and
 /// [`ReconstructError::Failed`] if the network gives no image.
 pub fn with_network(
     measurements: &Measurements,
-    network: Option<&dyn Network>,
+    network: &dyn Network,
     name: &str,
 ) -> Result<Reconstruction, ReconstructError> {
-    let (network, seen) = match usable(measurements, network) {
-        Ok(usable) => usable,
+    let side = measurements.side();
+    if !network.takes(side) {
+        let network = network.name().to_owned();
+        return Err(ReconstructError::NetworkSide { network, side: side.pixels() });
+    }
+    let seen = match completable(measurements) {
+        Ok(seen) => seen,
         Err(why) => return classical(measurements, name, &why),
     };
     let complete = |seen: &Seen| network.complete(seen).map_err(ReconstructError::Failed);
@@ -159,30 +166,17 @@ fn without_each(
     Ok(predicted)
 }
 
-/// The network and what it is given; or why there is no use for the network.
-fn usable<'n>(
-    measurements: &Measurements,
-    network: Option<&'n dyn Network>,
-) -> Result<(&'n dyn Network, Seen), String> {
-    let Some(network) = network else {
-        return Err("no network was given".to_owned());
-    };
-    let (side, count) = (measurements.side(), measurements.rows().len());
-    let n = side.pixels();
-    if !network.takes(side) {
-        return Err(format!("the network {} does not take {n} x {n} pixels", network.name()));
-    }
-    let least = LEAST_PATTERNS.max((LEAST_SHARE * side.area() as f64).ceil() as usize);
+/// What a network is given; or why there is no use for a network.
+fn completable(measurements: &Measurements) -> Result<Seen, String> {
+    let (area, count) = (measurements.side().area(), measurements.rows().len());
+    let least = LEAST_PATTERNS.max((LEAST_SHARE * area as f64).ceil() as usize);
     if count < least {
         return Err(format!(
             "{} measured, expected at least {least} for the network",
             words::count_of(count, "pattern")
         ));
     }
-    match Seen::new(measurements) {
-        Some(seen) => Ok((network, seen)),
-        None => Err("the measurements show no contrast".to_owned()),
-    }
+    Seen::new(measurements).ok_or_else(|| "the measurements show no contrast".to_owned())
 }
 
 /// Tikhonov's image, with the reason for it.

@@ -1,6 +1,12 @@
 use super::*;
+use crate::reconstruct::prior::{Network, Seen};
 use crate::testing::{correlation_of, measured, scene, side};
 use crate::{Order, reconstruct};
+
+/// The methods of this crate that need no network.
+fn alone() -> impl Iterator<Item = &'static Method> {
+    Method::ALL.iter().filter(|method| !method.needs_network())
+}
 
 fn part() -> Measurements {
     measured(side(16), &scene(side(16), 2)).take(Some(&Order::ZigZag), 0.3).unwrap()
@@ -20,6 +26,41 @@ fn words_are_read_as_they_are_written_and_stand_once() {
     assert_eq!(format!("{:?}", Method::OMP), "Method(omp)");
 }
 
+/// A network that completes every image with zeros.
+struct NoScene;
+
+impl Network for NoScene {
+    fn name(&self) -> &str {
+        "no scene"
+    }
+
+    fn takes(&self, _: crate::Side) -> bool {
+        true
+    }
+
+    fn complete(&self, seen: &Seen) -> Result<Vec<f32>, String> {
+        Ok(vec![0.0; seen.values().len()])
+    }
+}
+
+#[test]
+fn a_method_that_needs_a_network_is_an_error_without_one() {
+    for method in Method::ALL {
+        match method.prepare(&MethodSettings::default()) {
+            Ok(_) => assert!(!method.needs_network(), "{method}"),
+            Err(error) => {
+                assert!(method.needs_network(), "{method}");
+                let words =
+                    "the method prior needs a network: give it one, or choose another method";
+                assert_eq!(error.to_string(), words);
+            }
+        }
+    }
+    let network = Some(SharedNetwork::new(NoScene));
+    let settings = MethodSettings { network, ..MethodSettings::default() };
+    assert!(Method::ALL.iter().all(|method| method.prepare(&settings).is_ok()));
+}
+
 #[test]
 fn methods_with_a_past_begin_a_video_with_it() {
     for (word, has_a_past) in [
@@ -31,8 +72,9 @@ fn methods_with_a_past_begin_a_video_with_it() {
         ("omp", false),
     ] {
         let method: Method = word.parse().unwrap();
-        let ready = method.prepare(&MethodSettings::default()).unwrap();
-        assert_eq!(ready.begin_video().unwrap().is_some(), has_a_past, "{word}");
+        let network = Some(SharedNetwork::new(NoScene));
+        let ready = method.prepare(&MethodSettings { network, ..MethodSettings::default() });
+        assert_eq!(ready.unwrap().begin_video().unwrap().is_some(), has_a_past, "{word}");
         assert!(method.takes(Setting::WarmStart), "{word}");
     }
 }
@@ -51,7 +93,7 @@ fn a_users_own_patterns_have_the_method_of_the_same_name() {
 
 #[test]
 fn every_method_reports_its_own_name_with_the_image() {
-    for method in Method::ALL {
+    for method in alone() {
         let ready = method.prepare(&MethodSettings::default()).unwrap();
         let made = ready.reconstruct(&part()).unwrap();
         assert_eq!(ready.name(), method.name());
@@ -149,7 +191,7 @@ fn one_list_of_settings_makes_every_method_ready() {
         basis: Basis::Pixel,
         ..MethodSettings::default()
     };
-    for &method in Method::ALL {
+    for &method in alone() {
         let taken = asked.taken_by(method);
         assert_eq!(taken.non_negative, method.takes(Setting::NonNegative), "{method}");
         assert_eq!(
@@ -176,19 +218,18 @@ fn atoms_of_ones_own_are_named_in_the_report() {
 #[test]
 fn frames_of_a_video_start_warm_where_the_method_can() {
     let frames = vec![part(); 3];
-    for method in Method::ALL {
+    for method in alone() {
         let ready = method.prepare(&MethodSettings::default()).unwrap();
         let made = ready.reconstruct_video(&frames).unwrap();
         let warm: Vec<bool> = made.iter().map(|made| made.report.warm).collect();
-        // The learned prior starts warm as soon as other readings than those before support the past.
-        let starts_warm = method.takes(Setting::WarmStart) && *method != Method::PRIOR;
+        let starts_warm = method.takes(Setting::WarmStart);
         assert_eq!(warm, [false, starts_warm, starts_warm], "{method}");
     }
 }
 
 #[test]
 fn an_image_in_memory_of_the_caller_is_the_same_image() {
-    for method in Method::ALL {
+    for method in alone() {
         let ready = method.prepare(&MethodSettings::default()).unwrap();
         let made = ready.reconstruct(&part()).unwrap();
         let mut pixels = vec![7.0; made.image.pixels().len()];
@@ -218,7 +259,7 @@ impl Reconstruct for Flat {
 #[test]
 fn a_method_of_ones_own_stands_beside_the_built_in_ones() {
     let mut all: Vec<Box<dyn Reconstruct>> = vec![Box::new(Flat)];
-    for method in Method::ALL {
+    for method in alone() {
         all.push(method.prepare(&MethodSettings::default()).unwrap());
     }
     let image = |method: &dyn Reconstruct| method.reconstruct(&part()).unwrap().image;

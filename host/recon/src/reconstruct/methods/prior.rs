@@ -17,11 +17,16 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     about: "Completed by a small network, as far as held-back measurements support the network; measured rows are weighted means of reading and network",
     takes: &[Setting::WarmStart],
     with_matrix: None,
-    prepare: |settings| Ok(Box::new(Prior { network: settings.network.clone() })),
+    prepare: |settings| {
+        let Some(network) = settings.network.clone() else {
+            return Err(ReconstructError::NeedsNetwork { method: Method::PRIOR });
+        };
+        Ok(Box::new(Prior { network }))
+    },
 });
 
 struct Prior {
-    network: Option<SharedNetwork>,
+    network: SharedNetwork,
 }
 
 impl Reconstruct for Prior {
@@ -30,8 +35,7 @@ impl Reconstruct for Prior {
     }
 
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
-        let network = self.network.as_ref().map(SharedNetwork::get);
-        with_network(measurements, network, NAME)
+        with_network(measurements, self.network.get(), NAME)
     }
 
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {

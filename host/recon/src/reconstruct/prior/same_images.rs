@@ -41,7 +41,7 @@ fn a_networks_images_are_those_that_it_made() {
             let network = Half { truth: scene(side(16), kind), known };
             let without = part.clone().with_noise(0.0).unwrap();
             for (noise, part) in [("estimated", &part), ("no", &without)] {
-                let made = with_network(part, Some(&network), "half").unwrap();
+                let made = with_network(part, &network, "half").unwrap();
                 table.made(&format!("{known} known, {noise} noise, {name}"), &made);
             }
         }

@@ -6,7 +6,7 @@ use super::*;
 fn every_method_makes_the_images_that_it_made() {
     let mut table = Table::default();
     for (name, part) in parts() {
-        for method in Method::ALL {
+        for method in Method::ALL.iter().filter(|method| !method.needs_network()) {
             let ready = method.prepare(&MethodSettings::default()).unwrap();
             table.made(&format!("{method}, {name}"), &ready.reconstruct(&part).unwrap());
         }
