@@ -239,7 +239,12 @@ fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
     let broken = claimed.broken(on, off);
     let says = |explanation| Some(Doubt::Form { claimed: claim.form, broken, explanation });
     let own = partnership(pairs);
-    let least = if broken.above + broken.below == 0 { FAR_BETTER } else { BETTER };
+    let breaks_the_law = broken.above + broken.below > 0;
+    // Partners that know much of each other and keep the law are the right ones.
+    if !breaks_the_law && own * (count as f64).sqrt() > FAR_BETTER {
+        return None;
+    }
+    let least = if breaks_the_law { BETTER } else { FAR_BETTER };
     // All-on and all-off are farther apart than any other two patterns.
     let better = |other: &[[f64; 2]], apart: f64| {
         if apart < MORE_APART * (on - off) {
