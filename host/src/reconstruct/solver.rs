@@ -284,7 +284,6 @@ mod tests {
                 sparsity: Sparsity::Fixed(40),
                 residual: 0.01,
                 backend: Backend::Cpu,
-                completion: Some(Completion::Sparse),
                 ..MethodSettings::default()
             },
             dictionary: None,
@@ -303,7 +302,6 @@ mod tests {
             "as_printed": false,
             "non_negative": false,
             "strength": {"cross_validated": 4},
-            "completion": "sparse",
             "backend": "cpu",
         });
         assert_eq!(key, frozen);
