@@ -138,10 +138,19 @@ impl VirtualOptics {
         Ok(Self { chain, ..sheet })
     }
 
-    /// ADC counts of one pixel for a white target, from the photon budget.
-    #[must_use]
-    pub fn white_counts(&self) -> f64 {
-        self.budget.electrons_per_led / self.chain.electrons_per_count
+    /// The same camera before a white sheet in place of the target: at its distance, in its weather.
+    ///
+    /// # Errors
+    /// Does not occur for optics that could be built, because distance and weather are the same.
+    pub fn white_sheet_at_target(&self) -> Result<Self, VirtualOpticsError> {
+        let sheet = Self::of(&self.camera, Scene::white(), self.distance_mm)?;
+        let ChainSettings { electrons_per_count, ambient_electrons, .. } = sheet.chain;
+        let chain = ChainSettings { electrons_per_count, ambient_electrons, ..self.chain };
+        let sheet = Self { chain, ..sheet };
+        match &self.weather {
+            Some(weather) => sheet.in_weather(weather.clone()),
+            None => Ok(sheet),
+        }
     }
 
     /// The serial number of the virtual camera with this seed. Cameras with different instruments

@@ -123,7 +123,7 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
         npy::encode(&[2, 32, 32], &stack)
     };
     bench.write("nan.npy", &with(1024 + 32 + 3, f32::NAN));
-    bench.write("bright.npy", &with(1024 + 32 + 3, 1.25));
+    bench.write("bright.npy", &with(1024 + 32 + 3, 1.75));
     bench.write("dark.npy", &with(5, -0.5));
     bench.write("good.npy", &with(0, 0.5));
     bench.write("large.npy", &npy::encode(&[1, 64, 64], &bar(64)));
@@ -135,7 +135,7 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
     let files = bench.names();
     let enhance = |input: &str| bench.run(&["enhance", input, "--out", "out.npy"]);
     enhance("nan.npy").failed(1, &["nan.npy", "NaN", "[1, 1, 3]"]);
-    enhance("bright.npy").failed(1, &["bright.npy", "image 1, row 1, column 3 is 1.25", "0 to 1"]);
+    enhance("bright.npy").failed(1, &["bright.npy", "image 1, row 1, column 3 is 1.75", "0 to 1"]);
     enhance("dark.npy").failed(1, &["dark.npy", "-0.5", "0 to 1"]);
     enhance("large.npy").failed(1, &["large.npy", "64 x 64", "expected 32 x 32"]);
     enhance("empty.npy").failed(1, &["empty.npy", "(0, 32, 32)"]);
