@@ -119,7 +119,10 @@ impl FromStr for Light {
 
 impl fmt::Display for Light {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}ms", self.0)
+        match self.0 {
+            ms if ms < 1e3 => write!(f, "{ms}ms"),
+            ms => write!(f, "{}s", ms / 1e3),
+        }
     }
 }
 
@@ -238,6 +241,7 @@ mod tests {
         for (text, ms) in [("20ms", 20.0), ("20 ms", 20.0), ("0.02s", 20.0), (" 1e-1 s ", 100.0)] {
             assert!((text.parse::<Light>().unwrap().ms() - ms).abs() < 1e-9, "{text}");
         }
+        assert_eq!("2000ms".parse::<Light>().unwrap().to_string(), "2s");
         for (text, words) in [
             ("20", "write 20ms or 20s"),
             ("0", "more than 0"),

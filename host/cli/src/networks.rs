@@ -52,9 +52,9 @@ impl ImageArgs {
         let cut = images.cut_noise();
         if cut > 0 {
             let (path, values) = (self.input.display(), count_of(cut, "value"));
-            print::remark(format_args!(
-                "{path}: {values} below 0 or above 1, as noise makes them, are read as 0 and 1"
-            ));
+            let note =
+                format!("{path}: {values} below 0 or above 1, by noise, are read as 0 and 1");
+            if self.report.json { print::remark(note) } else { print::note(note)? }
         }
         Ok(images)
     }

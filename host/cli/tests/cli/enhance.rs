@@ -285,3 +285,24 @@ fn a_precision_that_does_not_exist_is_refused_and_the_processor_has_one_alone() 
     assert!(half.code == Some(0) && half.stderr.contains(said), "{half:?}");
     enhance("bf16").failed(2, &["precision \"bf16\", expected f32 or f16"]);
 }
+
+#[test]
+fn noise_below_black_and_above_white_is_cut_and_counted() {
+    let bench = Bench::new();
+    let of = |low: f32, high: f32| -> Vec<f32> {
+        let value = |at: usize| match at {
+            7 => low,
+            99 | 500 => high,
+            at => (at % 32) as f32 / 31.0,
+        };
+        (0..1024).map(value).collect()
+    };
+    let encode = |values: &[f32]| nirspi::files::npy::encode(&[1, 32, 32], values);
+    bench.write("noisy.npy", &encode(&of(-0.3, 1.4)));
+    bench.write("cut.npy", &encode(&of(0.0, 1.0)));
+    let said = bench.run(&["enhance", "noisy.npy", "--out", "a.npy"]).succeeded().stdout;
+    assert!(said.contains("noisy.npy: 3 values below 0 or above 1"), "{said}");
+    let said = bench.run(&["enhance", "cut.npy", "--out", "b.npy"]).succeeded().stdout;
+    assert!(!said.contains("below 0"), "{said}");
+    assert_eq!(bench.pixels("a.npy"), bench.pixels("b.npy"));
+}
