@@ -63,6 +63,7 @@ pub mod events;
 pub mod example;
 #[cfg(not(target_family = "wasm"))]
 pub mod export;
+pub mod exposure;
 pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;

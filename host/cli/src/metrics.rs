@@ -19,7 +19,7 @@ use std::process::ExitCode;
 /// classifier and needs at least two images of 64 x 64 pixels; FID needs your own Inception weights. The report is JSON.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy\n\
+    \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy --align gain-offset\n\
     \x20 nirspi metrics full/ third/ --align gain-offset\n\
     \x20 nirspi metrics sharp.npy deblurred.npy --labels labels.npy --legibility\n\
     \x20 nirspi metrics sharp.npy deblurred.npy --inception inception.safetensors")]

@@ -92,6 +92,7 @@ fn picture(made: &Compared, frame: usize) -> SideBySide {
         unit: Unit::Reflectance,
         caption: vec![caption],
         warnings: Vec::new(),
+        field_mm: None,
     };
     let mut panels = vec![panel("scene".to_owned(), &made.truths[frame].pixels, String::new())];
     let turns = made.rows.len() - 1;

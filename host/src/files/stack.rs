@@ -74,6 +74,9 @@ pub enum StackError {
     },
 }
 
+/// So far, in shares of white, noise takes values below black and above white.
+const NOISE: f32 = 0.5;
+
 type Result<T> = std::result::Result<T, StackError>;
 
 /// Images of one size.
@@ -149,6 +152,22 @@ impl ImageStack {
         }
         let form = Form::Pictures(names);
         Ok(Self { path: path.to_owned(), count: files.len(), height, width, values, form })
+    }
+
+    /// Cuts values that noise has taken out of `[0, 1]` to 0 or 1, as images in shares of white have
+    /// them. Returns the number of values cut. If a value is off by [`NOISE`] or more, the images
+    /// have another scale: they stay as they are.
+    pub fn cut_noise(&mut self) -> usize {
+        let is_near = |value: &f32| *value > -NOISE && *value < 1.0 + NOISE;
+        if !self.values.iter().all(is_near) {
+            return 0;
+        }
+        let mut cut = 0;
+        for value in self.values.iter_mut().filter(|value| !(0.0..=1.0).contains(*value)) {
+            *value = value.clamp(0.0, 1.0);
+            cut += 1;
+        }
+        cut
     }
 
     /// The number of images.

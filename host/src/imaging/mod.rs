@@ -1,7 +1,7 @@
 //! Enhances a reconstructed image, and gives its quality and its warnings.
 //!
 //! ```text
-//! Image (ADC counts) ──white──> [0, 1] ──Enhance──> 64 x 64 in [0, 1] ──> Warning, Quality
+//! Image (ADC counts) ──white──> shares of white ──Enhance──> 64 x 64 in [0, 1] ──> Warning, Quality
 //! ```
 //!
 //! `demo`, `reconstruct`, `capture`, `serve` and `eval` all use this module for the white level,
@@ -26,11 +26,11 @@ pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COP
 #[cfg(feature = "enhance")]
 pub use frames::{FrameReport, FramesError, enhance_frame, enhance_frames, enhance_frames_by};
 pub use method_report::MethodReport;
-pub use quality::{Fit, Fitted, Quality, compare};
+pub use quality::{Fit, Noise, Quality, score};
 #[cfg(feature = "enhance")]
 pub use readings::KnownReadings;
 #[cfg(feature = "enhance")]
 pub use stack_report::{Deblurring, StackReport};
 #[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};
-pub use white::SteadyWhite;
+pub use white::{SteadyWhite, share_of_white};

@@ -138,10 +138,19 @@ impl VirtualOptics {
         Ok(Self { chain, ..sheet })
     }
 
-    /// ADC counts of one pixel for a white target, from the photon budget.
-    #[must_use]
-    pub fn white_counts(&self) -> f64 {
-        self.budget.electrons_per_led / self.chain.electrons_per_count
+    /// The same camera before a white sheet in place of the target: at its distance, in its weather.
+    ///
+    /// # Errors
+    /// Does not occur for optics that could be built, because distance and weather are the same.
+    pub fn white_sheet_at_target(&self) -> Result<Self, VirtualOpticsError> {
+        let sheet = Self::of(&self.camera, Scene::white(), self.distance_mm)?;
+        let ChainSettings { electrons_per_count, ambient_electrons, .. } = sheet.chain;
+        let chain = ChainSettings { electrons_per_count, ambient_electrons, ..self.chain };
+        let sheet = Self { chain, ..sheet };
+        match &self.weather {
+            Some(weather) => sheet.in_weather(weather.clone()),
+            None => Ok(sheet),
+        }
     }
 
     /// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared, for this light
@@ -153,14 +162,6 @@ impl VirtualOptics {
         let readout = self.camera.readout;
         let window = u32::from(readout.clocks_per_pattern.saturating_sub(readout.blanked));
         self.chain.variance_of_mean(electrons, window) / (gain * gain) / f64::from(sweeps)
-    }
-
-    /// Standard deviation of the difference of a pattern and its complement in `sweeps` sweeps, in ADC
-    /// counts, from the photon budget. Each pattern lights half of the LEDs.
-    #[must_use]
-    pub fn difference_noise_counts(&self, sweeps: u32) -> f64 {
-        let light: f64 = self.footprint.weights().iter().map(|&w| f64::from(w)).sum();
-        (2.0 * self.mean_variance(light * self.white_counts() / 2.0, sweeps)).sqrt()
     }
 
     /// The serial number of the virtual camera with this seed. Cameras with different instruments

@@ -138,7 +138,7 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
         npy::encode(&[2, 32, 32], &stack)
     };
     bench.write("nan.npy", &with(1024 + 32 + 3, f32::NAN));
-    bench.write("bright.npy", &with(1024 + 32 + 3, 1.25));
+    bench.write("bright.npy", &with(1024 + 32 + 3, 1.75));
     bench.write("dark.npy", &with(5, -0.5));
     bench.write("good.npy", &with(0, 0.5));
     bench.write("large.npy", &npy::encode(&[1, 64, 64], &bar(64)));
@@ -150,7 +150,7 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
     let files = bench.names();
     let enhance = |input: &str| bench.run(&["enhance", input, "--out", "out.npy"]);
     enhance("nan.npy").failed(1, &["nan.npy", "NaN", "[1, 1, 3]"]);
-    enhance("bright.npy").failed(1, &["bright.npy", "image 1, row 1, column 3 is 1.25", "0 to 1"]);
+    enhance("bright.npy").failed(1, &["bright.npy", "image 1, row 1, column 3 is 1.75", "0 to 1"]);
     enhance("dark.npy").failed(1, &["dark.npy", "-0.5", "0 to 1"]);
     enhance("large.npy").failed(1, &["large.npy", "64 x 64", "expected 32 x 32"]);
     enhance("empty.npy").failed(1, &["empty.npy", "(0, 32, 32)"]);
@@ -299,4 +299,25 @@ fn a_precision_that_does_not_exist_is_refused_and_the_processor_has_one_alone() 
     let said = "precision f16 needs a GPU with tensor cores, through CUDA; CPU computes in f32";
     assert!(half.code == Some(0) && half.stderr.contains(said), "{half:?}");
     enhance("bf16").failed(2, &["precision \"bf16\", expected f32 or f16"]);
+}
+
+#[test]
+fn noise_below_black_and_above_white_is_cut_and_counted() {
+    let bench = Bench::new();
+    let of = |low: f32, high: f32| -> Vec<f32> {
+        let value = |at: usize| match at {
+            7 => low,
+            99 | 500 => high,
+            at => (at % 32) as f32 / 31.0,
+        };
+        (0..1024).map(value).collect()
+    };
+    let encode = |values: &[f32]| nirspi::files::npy::encode(&[1, 32, 32], values);
+    bench.write("noisy.npy", &encode(&of(-0.3, 1.4)));
+    bench.write("cut.npy", &encode(&of(0.0, 1.0)));
+    let said = bench.run(&["enhance", "noisy.npy", "--out", "a.npy"]).succeeded().stdout;
+    assert!(said.contains("noisy.npy: 3 values below 0 or above 1"), "{said}");
+    let said = bench.run(&["enhance", "cut.npy", "--out", "b.npy"]).succeeded().stdout;
+    assert!(!said.contains("below 0"), "{said}");
+    assert_eq!(bench.pixels("a.npy"), bench.pixels("b.npy"));
 }
