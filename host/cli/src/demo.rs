@@ -186,7 +186,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.method.settings_for(measurements.side().pixels())?;
     // In shares of the white sheet, as the image.
     let noise = measurements.noise().map(|counts| counts / f64::from(white));
-    let readings = KnownReadings::new(args.method.method, &settings, &measurements, noise);
+    let readings = KnownReadings::new(method.used(), &settings, &measurements, noise);
     let rows = measurements.rows();
     let stages = enhance_stages(&image, rows, readings, &optics, seed, &mut times)?;
     if quality.inverted {

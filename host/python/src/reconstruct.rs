@@ -13,7 +13,7 @@ use nirspi::reconstruct::Recipe;
 use nirspi::source::{FirstPatterns, Index, Several};
 use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
-    Report, Setting, Sparsity, Strength,
+    Report, Setting, Sparsity, Stacked, Strength,
 };
 use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Side};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
@@ -159,7 +159,7 @@ fn of_method(error: ReconstructError) -> PyErr {
 
 /// A method made ready for measurements of the same rows.
 struct Ready {
-    method: Box<dyn Reconstruct>,
+    method: Stacked,
     rows: Rows,
     first: FirstPatterns,
     sampling: f64,
@@ -176,7 +176,7 @@ impl Ready {
         first: FirstPatterns,
         sampling: f64,
     ) -> PyResult<Self> {
-        let method = method.prepare(settings).map_err(of_method)?;
+        let method = Stacked::new(method.prepare(settings).map_err(of_method)?);
         let (whole, order) = first.among(&rows, sampling).map_err(refusal)?;
         Ok(Self { method, rows, first, sampling, whole, order })
     }
@@ -188,6 +188,11 @@ impl Ready {
             return Ok((self.whole.shorten(frame), self.order.clone()));
         }
         self.first.take(&frame, self.sampling).map_err(refusal)
+    }
+
+    /// Chooses the method by these differences, before several threads make images.
+    fn settle(&self, d: &[f64]) -> PyResult<()> {
+        self.method.settle(&self.taken(d)?.0).map_err(of_method)
     }
 
     /// Writes the image of these differences to `pixels`.
@@ -309,6 +314,9 @@ pub fn reconstruct<'py>(
         let made = if warm {
             ready.video(d, places)?
         } else {
+            if let Some(first) = d.chunks_exact(ready.rows.len()).next() {
+                ready.settle(first)?;
+            }
             let one = |(d, place): (&[f64], &mut [f32])| match stop.load(Ordering::Relaxed) {
                 true => Err(stopped()),
                 false => ready.image(d, place),

@@ -37,6 +37,7 @@ mod recursive;
 mod regularised;
 mod report;
 mod selection;
+mod stacked;
 mod video;
 mod weight;
 
@@ -52,6 +53,7 @@ pub use own_matrix::{
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings, believed_frame, fused_frame};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};
+pub use stacked::Stacked;
 pub use video::{VideoFrame, omp_video};
 pub use weight::WITHIN;
 

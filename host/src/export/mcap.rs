@@ -13,7 +13,7 @@ use crate::tally::{Heard, Tally, hear_recording};
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use crate::{depth_image, recording::Pinhole};
 use nirspi_recon::Image;
-use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct};
+use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct, Stacked};
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use nirspi_wire::DeviceMessage;
 use std::io::{self, Write};
@@ -117,8 +117,8 @@ fn each(
     let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
     let path = &whole.path;
     let problem = |frame| move |problem| ExportError::Image { path: path.clone(), frame, problem };
-    let method: Box<dyn Reconstruct> =
-        Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
+    let method = Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
+    let method = Stacked::new(method);
     let image = |sum: &Integrated, frame: usize| -> Result<Image, ExportError> {
         let measurements = sum
             .measurements_of(whole.detector, &setup, settling.as_ref(), whole.keep_leak)

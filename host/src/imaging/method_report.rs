@@ -1,7 +1,8 @@
 //! The report of a reconstruction method, for JSON reports and captions.
 
+use nirspi_recon::Measurements;
 use nirspi_recon::omp::Backend;
-use nirspi_recon::reconstruct::{Method, Report};
+use nirspi_recon::reconstruct::{HeldBack, Method, Report, explanation};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use std::fmt;
@@ -16,6 +17,27 @@ pub struct MethodReport {
 }
 
 impl MethodReport {
+    /// The method that made the image: the chosen one, if it was chosen among several.
+    #[must_use]
+    pub fn used(&self) -> Method {
+        self.made.chosen.and_then(|word| word.parse().ok()).unwrap_or(self.method)
+    }
+
+    /// A warning if held-back readings say that the readings do not belong to their patterns, with
+    /// what would explain the readings. `measurements` are all that were read, in the order shown.
+    #[must_use]
+    pub fn doubt(&self, measurements: &Measurements) -> Option<String> {
+        let held_back = self.made.held_back.filter(HeldBack::is_by_chance)?;
+        let cause = match explanation(measurements) {
+            Some(cause) => format!("they fit {cause}"),
+            None => "they are noise, or belong to patterns of another order".to_owned(),
+        };
+        Some(format!(
+            "readings predict each other no better than chance ({:.0} % of their variation is confirmed): {cause}",
+            100.0 * held_back.confirmed
+        ))
+    }
+
     /// A few words for a caption.
     #[must_use]
     pub fn short(&self) -> String {
@@ -41,6 +63,8 @@ impl Serialize for MethodReport {
             strength: made.strength,
             sparsity: made.sparsity,
             weight_of_readings: made.reading_weight,
+            chosen: made.chosen,
+            held_back: made.held_back.map(Into::into),
             stop: made.stop,
             relative_residual: made.residual,
             unseen_atoms: made.unseen_atoms,
@@ -58,6 +82,23 @@ impl Serialize for MethodReport {
     }
 }
 
+/// What held-back readings say of the image.
+#[derive(PartialEq, Serialize)]
+struct HeldBackReport {
+    /// Absolute and squared error of the predictions, each relative to zero filling's; 2 is as bad.
+    error: f64,
+    /// Share of the readings' variation that the predictions explain.
+    confirmed_share: f64,
+    /// Agreement in sign, in standard errors.
+    agreement: f64,
+}
+
+impl From<HeldBack> for HeldBackReport {
+    fn from(found: HeldBack) -> Self {
+        Self { error: found.miss, confirmed_share: found.confirmed, agreement: found.score }
+    }
+}
+
 #[derive(Default, PartialEq, Serialize)]
 struct Details<'r> {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -72,6 +113,10 @@ struct Details<'r> {
     sparsity: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     weight_of_readings: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    chosen: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held_back: Option<HeldBackReport>,
     #[serde(skip_serializing_if = "Option::is_none")]
     stop: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -172,6 +172,11 @@ pub fn one_image(
         rows: d.rows,
     });
     let provenance = source.taken.made(request.made);
+    let mut warnings = source.warnings;
+    // A named form of the readings says more.
+    if warnings.is_empty() {
+        warnings.extend(method.doubt(&source.measurements));
+    }
     let report = OneReport {
         pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short), &provenance),
         input: request.input.to_owned(),
@@ -188,7 +193,7 @@ pub fn one_image(
         frames: source.frames,
         correlation_with_files_recon: correlation,
         enhancement,
-        warnings: source.warnings,
+        warnings,
         notes: source.notes,
         stage_ms: times,
     };

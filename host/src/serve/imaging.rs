@@ -16,7 +16,8 @@ use crate::integrate::IntegrateError;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
 use nirspi_recon::reconstruct::{
-    Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Setting, Strength,
+    Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Setting, Stacked,
+    Strength,
 };
 use nirspi_recon::{Measurements, Side};
 use serde::Serialize;
@@ -79,6 +80,10 @@ pub struct Imaging {
     enhance: (&'static str, Enhance),
 }
 
+/// Number of pictures after which a method that chooses among others chooses again: some seconds of a
+/// live view.
+const CHOSEN_EVERY: u32 = 100;
+
 /// A method of reconstruction that is ready.
 struct Prepared {
     name: &'static str,
@@ -96,9 +101,12 @@ impl Imaging {
     pub fn new(settings: &MethodSettings, device: Device) -> Result<Self, ImagingError> {
         let strength = strength_of(settings);
         let ready = |method: &Method| {
+            let name = method.argument();
             let prepared = method.prepare(&settings.taken_by(*method))?;
             let built_in = Some((*method, strength.filter(|_| method.takes(Setting::Strength))));
-            Ok(Prepared { name: method.argument(), method: prepared, built_in })
+            let method: Box<dyn Reconstruct> =
+                Box::new(Stacked::chosen_every(CHOSEN_EVERY, prepared));
+            Ok(Prepared { name, method, built_in })
         };
         let methods = Method::ALL.iter().map(ready).collect::<Result<_, ReconstructError>>()?;
         let mut networks = Networks::built_in(device.clone());

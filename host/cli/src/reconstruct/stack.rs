@@ -13,7 +13,7 @@ use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
 use nirspi::picture::{Pictures, Unit};
 use nirspi::reconstruct::{check_finite, not_read_words};
 use nirspi::source::{FirstPatterns, Index, OutlierReport};
-use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
+use nirspi_recon::reconstruct::{Method, Reconstruct, Reconstruction, Setting, Stacked};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Measurements, Rows};
 use serde::Serialize;
@@ -151,7 +151,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
 /// The image of each frame.
 fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> {
     let Some(first) = used.first() else { return Ok(Vec::new()) };
-    let method = args.method.prepare(first.side().pixels())?;
+    let method = Stacked::new(args.method.prepare(first.side().pixels())?);
     Ok(match args.warm_start {
         true => method.reconstruct_video(used)?,
         false => used.iter().map(|used| method.reconstruct(used)).collect::<Result<_, _>>()?,
