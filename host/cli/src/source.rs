@@ -12,7 +12,7 @@ use nirspi_recon::{Measurements, Order, Side};
 use std::path::PathBuf;
 
 /// Which measurements.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
     /// Measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or recording (.mcap)
@@ -104,6 +104,11 @@ impl SourceArgs {
         let source = self.load()?;
         let taken = source.taken.clone();
         Ok((source.real(&self.input).map_err(usage_or_failure)?, taken))
+    }
+
+    /// Two halves of a recording's frames; `None` for a file that is no recording of several.
+    pub fn halves(&self) -> Result<Option<[Measurements; 2]>> {
+        Source::halves(&self.input, &self.options()?).map_err(usage_or_failure)
     }
 
     /// Reads all measurements of a file or recording.

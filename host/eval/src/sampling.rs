@@ -1,5 +1,10 @@
-//! The quality of images of a part of the patterns, by order, basis and method, compared with the
-//! image of all patterns.
+//! The quality of images of a part of the patterns, by order, basis and method, judged by readings
+//! that the images were not made from.
+//!
+//! The image of all patterns of the same readings has the noise of the judged images, which favours
+//! methods that keep noise. So an independent measurement of the scene judges: the other half of a
+//! recording's frames, or a second file. Only where there is none, the same readings do, and the
+//! report says so.
 
 mod plot;
 mod tables;
@@ -11,6 +16,7 @@ use nirspi_recon::reconstruct::{
 };
 use nirspi_recon::{Basis, Image, Measurements, NamedOrder, Order, metrics};
 use serde::Serialize;
+use std::fmt;
 use std::path::PathBuf;
 
 /// The name of the order of the measurements.
@@ -73,13 +79,46 @@ pub struct Row {
     pub order: String,
     /// The method, with its basis.
     pub method: String,
-    /// PSNR against the image of all patterns, whose range of values is the peak.
+    /// PSNR against the reference, whose range of values is the peak. For an independent reference,
+    /// after the gain and offset of least squares, because its exposure may be another one.
     pub psnr_db: f64,
     /// PSNR minus that of zero filling of the same patterns; `null` if either is the image of all
     /// patterns itself.
     pub gain_db: Option<f64>,
-    /// Pearson's correlation with the image of all patterns.
+    /// Pearson's correlation with the reference.
     pub correlation: f64,
+}
+
+/// What judges the images of a study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JudgedBy {
+    /// The image of all patterns of the same readings, which has their noise.
+    SameReadings,
+    /// The other half of the recording's frames.
+    OtherFrames,
+    /// Another measurement of the same scene.
+    OtherMeasurement,
+}
+
+impl fmt::Display for JudgedBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::SameReadings => {
+                "the image of all patterns of the same readings, which has the noise of the judged images: \
+                 methods that keep noise look better than they are. Give a second measurement of the scene with \
+                 --against, or a recording of several frames"
+            }
+            Self::OtherFrames => {
+                "the image of all patterns of the other frames, whose noise is independent (PSNR after a fit of \
+                 gain and offset)"
+            }
+            Self::OtherMeasurement => {
+                "the image of all patterns of the other measurement, whose noise is independent (PSNR after a \
+                 fit of gain and offset)"
+            }
+        })
+    }
 }
 
 /// Every order, method and share.
@@ -91,6 +130,8 @@ pub struct Report {
     pub n: usize,
     /// Number of measurements of all patterns.
     pub measurements: usize,
+    /// What judges the images.
+    pub judged_by: JudgedBy,
     /// Each share, order and method.
     pub rows: Vec<Row>,
     /// The image of all patterns.
@@ -135,7 +176,16 @@ fn gain_db(psnr_db: f64, zero_db: f64) -> Option<f64> {
 
 impl Report {
     fn empty(input: PathBuf, n: usize) -> Self {
-        Self { input, n, measurements: 0, rows: Vec::new(), full: None, shown: Vec::new() }
+        let judged_by = JudgedBy::SameReadings;
+        Self {
+            input,
+            n,
+            measurements: 0,
+            judged_by,
+            rows: Vec::new(),
+            full: None,
+            shown: Vec::new(),
+        }
     }
 
     /// Adds the images of all methods with their PSNR and correlation, and keeps the best images.
@@ -192,20 +242,34 @@ impl Study {
         self.orders.len() * self.shares.len() * self.methods.len()
     }
 
-    /// Makes and judges every image; `done` is called after each.
+    /// Makes and judges every image; `done` is called after each. `judge` is an independent
+    /// measurement of the scene, and what it is.
     ///
     /// # Errors
-    /// [`EvalError::PartialSweep`] for fewer than 99 % of the patterns; other errors for an order
-    /// that is not a permutation, or measurements that a method cannot invert.
-    pub fn run(&self, input: PathBuf, all: &Measurements, done: &dyn Fn()) -> Result<Report> {
-        let (found, expected) = (all.rows().len(), all.side().area());
-        // The reference remains usable without a few patterns that dropped out or were not read.
-        if found * 100 < expected * 99 {
-            return Err(EvalError::PartialSweep { found, expected });
+    /// [`EvalError::PartialSweep`] for fewer than 99 % of the patterns; [`EvalError::Content`] for
+    /// two measurements that do not show the same scene; other errors for an order that is not a
+    /// permutation, or measurements that a method cannot invert.
+    pub fn run(
+        &self,
+        input: PathBuf,
+        all: &Measurements,
+        judge: Option<(&Measurements, JudgedBy)>,
+        done: &dyn Fn(),
+    ) -> Result<Report> {
+        let reference = judge.map_or(all, |(judge, _)| judge);
+        for measured in [all, reference] {
+            let (found, expected) = (measured.rows().len(), measured.side().area());
+            // The reference remains usable without a few patterns that dropped out or were not read.
+            if found * 100 < expected * 99 {
+                return Err(EvalError::PartialSweep { found, expected });
+            }
         }
-        let full = reconstruct::hadamard(all);
+        let full = reconstruct::hadamard(reference);
+        same_scene(&reconstruct::hadamard(all), &full)?;
         let mut report = Report::empty(input, full.side().pixels());
         report.measurements = all.rows().len();
+        report.judged_by = judge.map_or(JudgedBy::SameReadings, |(_, judged_by)| judged_by);
+        let fitted = judge.is_some();
         for &sampling in &self.shares {
             for (name, order) in &self.orders {
                 let part = all.take(order.as_ref(), sampling)?;
@@ -220,7 +284,7 @@ impl Study {
                         }
                         Err(error) => return Err(error.into()),
                     };
-                    let (psnr_db, correlation) = judge(&full, &image)?;
+                    let (psnr_db, correlation) = judged(&full, &image, fitted)?;
                     made.push((
                         Made { method: candidate.name.clone(), image, psnr_db },
                         correlation,
@@ -259,9 +323,48 @@ impl Study {
     }
 }
 
+/// Standard errors of the correlation of two images of noise from which they show one scene.
+const ONE_SCENE: f64 = 5.0;
+
+/// Refuses two measurements whose images of all patterns have nothing in common.
+fn same_scene(one: &Image, other: &Image) -> Result<()> {
+    let [side, other_side] = [one, other].map(|image| image.side().pixels());
+    if side != other_side {
+        return Err(EvalError::Content(format!(
+            "the measurements have {side} x {side} and {other_side} x {other_side} pixels, expected the same"
+        )));
+    }
+    let correlation = metrics::correlation(one.pixels(), other.pixels(), side, side)?;
+    if correlation * side as f64 >= ONE_SCENE {
+        return Ok(());
+    }
+    Err(EvalError::Content(format!(
+        "the two measurements do not show the same scene: the correlation of their images of all patterns is \
+         {correlation:.2}, expected at least {:.2}",
+        ONE_SCENE / side as f64
+    )))
+}
+
+/// The image times the gain plus the offset of least squares to the reference.
+fn fitted_to(full: &Image, image: &Image) -> Image {
+    let mean = |v: &[f32]| v.iter().map(|&v| f64::from(v)).sum::<f64>() / v.len() as f64;
+    let (to, from) = (mean(full.pixels()), mean(image.pixels()));
+    let (mut both, mut square) = (0.0, 0.0);
+    for (&reference, &pixel) in full.pixels().iter().zip(image.pixels()) {
+        let pixel = f64::from(pixel) - from;
+        both += pixel * (f64::from(reference) - to);
+        square += pixel * pixel;
+    }
+    let gain = if square > 0.0 { both / square } else { 0.0 };
+    let fit = |&pixel: &f32| (to + gain * (f64::from(pixel) - from)) as f32;
+    Image::new(image.side(), image.pixels().iter().map(fit).collect())
+}
+
 /// Compares an image with the full image: PSNR with the full image's range of values as the peak,
-/// without a fit, and correlation.
-fn judge(full: &Image, image: &Image) -> Result<(f64, f64), metrics::MetricError> {
+/// and correlation. `fitted`: after the gain and offset of least squares.
+fn judged(full: &Image, image: &Image, fitted: bool) -> Result<(f64, f64), metrics::MetricError> {
+    let fit = fitted.then(|| fitted_to(full, image));
+    let image = fit.as_ref().unwrap_or(image);
     let side = full.side().pixels();
     let (low, high) = full
         .pixels()
@@ -301,7 +404,7 @@ mod tests {
     fn more_patterns_give_a_better_image_and_low_frequencies_first_the_best() {
         let done = std::cell::Cell::new(0);
         let study = study(&[0.25, 0.75]);
-        let report = study.run("disc".into(), &disc(), &|| done.set(done.get() + 1)).unwrap();
+        let report = study.run("disc".into(), &disc(), None, &|| done.set(done.get() + 1)).unwrap();
         assert_eq!((done.get(), report.rows.len()), (study.images(), 8));
         let psnr = |sampling: f64, order: &str, method: &str| {
             let sought =
@@ -321,7 +424,7 @@ mod tests {
     #[test]
     fn the_picture_has_a_panel_for_each_order_with_lines_that_differ() {
         let study = study(&[0.25, 0.75]);
-        let report = study.run("disc".into(), &disc(), &|| {}).unwrap();
+        let report = study.run("disc".into(), &disc(), None, &|| {}).unwrap();
         let charts = plot::charts(&report, &study.order_names(), &study.method_names());
         assert_eq!(charts.len(), 2);
         for chart in &charts {
@@ -375,6 +478,62 @@ mod tests {
         }
         let distinct: std::collections::BTreeSet<_> = looks.values().collect();
         assert_eq!(distinct.len(), looks.len(), "{looks:?}");
+    }
+
+    /// A disc with noise.
+    fn noisy(sigma: f64, seed: u64) -> Measurements {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_pcg::Pcg64::seed_from_u64(seed);
+        let all = disc();
+        let mut draw = || sigma * random.sample::<f64, _>(rand_distr::StandardNormal);
+        let values: Vec<f64> = all.values().iter().map(|v| v + draw()).collect();
+        Measurements::from_differential(all.rows(), &values).unwrap()
+    }
+
+    #[test]
+    fn an_independent_measurement_does_not_reward_noise_that_is_kept() {
+        let study = study(&[1.0]);
+        let (one, other) = (noisy(4.0, 1), noisy(4.0, 2));
+        let correlation = |report: &Report, method: &str| {
+            let row = |row: &&Row| row.method == method && row.order == RECORDED;
+            report.rows.iter().find(row).unwrap().correlation
+        };
+        let by_itself = study.run("a".into(), &one, None, &|| {}).unwrap();
+        assert_eq!(by_itself.judged_by, JudgedBy::SameReadings);
+        assert!(correlation(&by_itself, "hadamard") > 0.9999);
+        assert!(correlation(&by_itself, "tikhonov, dct") < 0.99);
+        let judge = Some((&other, JudgedBy::OtherMeasurement));
+        let by_other = study.run("a".into(), &one, judge, &|| {}).unwrap();
+        assert_eq!(by_other.judged_by, JudgedBy::OtherMeasurement);
+        assert!(
+            correlation(&by_other, "hadamard") + 0.01 < correlation(&by_other, "tikhonov, dct")
+        );
+        // Another exposure has another gain.
+        let bright: Vec<f64> = other.values().iter().map(|v| 3.0 * v + 1.0).collect();
+        let bright = Measurements::from_differential(other.rows(), &bright).unwrap();
+        let judge = Some((&bright, JudgedBy::OtherMeasurement));
+        let by_bright = study.run("a".into(), &one, judge, &|| {}).unwrap();
+        for (a, b) in by_bright.rows.iter().zip(&by_other.rows) {
+            assert!((a.psnr_db - b.psnr_db).abs() < 1e-2, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn measurements_of_two_scenes_are_refused() {
+        let stripes: Vec<f64> = (0..256).map(|p| f64::from(u8::from(p % 2 == 0))).collect();
+        let mut d = stripes;
+        fwht(&mut d).unwrap();
+        let rows = Rows::natural(Side::new(16).unwrap());
+        let other = Measurements::from_differential(&rows, &d).unwrap();
+        let judge = Some((&other, JudgedBy::OtherMeasurement));
+        let error = study(&[0.5]).run("a".into(), &disc(), judge, &|| {}).unwrap_err().to_string();
+        assert!(error.contains("do not show the same scene"), "{error}");
+        let small =
+            Measurements::from_differential(&Rows::natural(Side::new(8).unwrap()), &[1.0; 64])
+                .unwrap();
+        let judge = Some((&small, JudgedBy::OtherMeasurement));
+        let error = study(&[0.5]).run("a".into(), &disc(), judge, &|| {}).unwrap_err().to_string();
+        assert!(error.contains("16 x 16 and 8 x 8"), "{error}");
     }
 
     #[test]

@@ -9,18 +9,20 @@ use crate::{print, refused};
 use anyhow::{Context, Result};
 use nirspi::files::output::OutputDir;
 use nirspi::picture::signed_png;
-use nirspi_eval::sampling::{RECORDED, Study, default_orders};
+use nirspi_eval::sampling::{JudgedBy, RECORDED, Study, default_orders};
 use nirspi_recon::Sampling;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Compare orders, bases and methods at partial sampling, on measurements of a full sweep
 ///
-/// The image of all patterns is the reference. The command writes sampling.md (tables), sampling.json (every number) and
+/// An independent measurement of the scene judges the images: the other half of a recording's frames, or --against. Without
+/// either, the image of all patterns of the same readings does, which has their noise. The command writes sampling.md (tables), sampling.json (every number) and
 /// sampling.png (each order's gain over zero filling, and the best images).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
-    \x20 nirspi eval sampling wing.npz --out sampling/")]
+    \x20 nirspi eval sampling capture.mcap --out sampling/\n\
+    \x20 nirspi eval sampling wing.npz --against wing_again.npz --out sampling/")]
 pub struct Args {
     #[command(flatten)]
     source: SourceArgs,
@@ -30,6 +32,9 @@ pub struct Args {
     /// Orders to compare, by their names; `recorded` is the order in which the patterns were shown
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = default_orders())]
     orders: Vec<String>,
+    /// A second measurement of the same scene, which judges the images: its noise is independent. Read with the same options
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "sampling")]
     out: PathBuf,
@@ -49,11 +54,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let shares = args.sampling.iter().map(|sampling| sampling.share()).collect();
     let study = Study::new(orders, shares).map_err(refused)?;
     let input = &args.source.input;
-    let (measurements, taken) = args.source.load_real()?;
+    let (mut measurements, taken) = args.source.load_real()?;
+    let judge = match &args.against {
+        Some(other) => {
+            let other = SourceArgs { input: other.clone(), ..args.source.clone() };
+            Some((other.load_real()?.0, JudgedBy::OtherMeasurement))
+        }
+        None => args.source.halves()?.map(|[one, other]| {
+            measurements = one;
+            (other, JudgedBy::OtherFrames)
+        }),
+    };
+    let judge = judge.as_ref().map(|(judge, judged_by)| (judge, *judged_by));
     let provenance = taken.made(made());
     let bar = Progress::of("sampling", study.images(), "images");
     let report = study
-        .run(input.clone(), &measurements, &|| bar.add(1))
+        .run(input.clone(), &measurements, judge, &|| bar.add(1))
         .with_context(|| input.display().to_string())?;
     drop(bar);
     let tables = format!("{}\n{provenance}\n", study.tables(&report));

@@ -80,7 +80,7 @@ fn images_are_shares_of_white_with_their_noise_and_the_fit_stands_beside_the_sco
     let bench = Bench::new();
     // A grey picture: a fit to the truth would hide a wrong scale.
     let grey: Vec<f32> = (0..64 * 64).map(|p| if p % 64 < 32 { 0.1 } else { 0.4 }).collect();
-    bench.write("grey.png", &encode_grey(64, 64, &grey));
+    bench.write("grey.png", &encode_grey(64, 64, &grey, &provenance()));
     let demo = ["demo", "--scene", "grey.png", "--sampling", "1", "--out", "demo", "--json"];
     let report = bench.run(&demo).succeeded().json();
     for (file, grid, stage) in [
@@ -119,7 +119,7 @@ fn images_are_shares_of_white_with_their_noise_and_the_fit_stands_beside_the_sco
 #[test]
 fn a_flat_scene_has_a_noise_figure_and_its_own_grey() {
     let bench = Bench::new();
-    bench.write("grey.png", &encode_grey(8, 8, &[0.4; 64]));
+    bench.write("grey.png", &encode_grey(8, 8, &[0.4; 64], &provenance()));
     // The noise of a white pixel by the photon budget: SNR 26.8 at 0.3 m and 2.5 at 1 m.
     for (scene, level, distance, std) in
         [("white", 0.9, "0.3", 0.0373), ("black", 0.0, "0.3", 0.0365), ("grey.png", 0.4, "1", 0.39)]

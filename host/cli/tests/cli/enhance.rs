@@ -312,7 +312,7 @@ fn noise_below_black_and_above_white_is_cut_and_counted() {
         };
         (0..1024).map(value).collect()
     };
-    let encode = |values: &[f32]| nirspi::files::npy::encode(&[1, 32, 32], values);
+    let encode = |values: &[f32]| npy::encode(&[1, 32, 32], values);
     bench.write("noisy.npy", &encode(&of(-0.3, 1.4)));
     bench.write("cut.npy", &encode(&of(0.0, 1.0)));
     let said = bench.run(&["enhance", "noisy.npy", "--out", "a.npy"]).succeeded().stdout;

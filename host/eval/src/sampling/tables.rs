@@ -21,7 +21,7 @@ pub(super) fn all(
 ) -> String {
     let (methods, idle) = telling_methods(report, orders, methods, shares);
     let (orders, repeated) = telling_orders(report, orders, &methods, shares);
-    let mut text = String::new();
+    let mut text = format!("Judged by {}.\n\n", report.judged_by);
     // Writing to a string cannot fail.
     for &share in shares {
         best(&mut text, report, &orders, &methods, share);
