@@ -7,6 +7,7 @@
 
 use crate::Measurements;
 use crate::reconstruct::method::{Entry, Setting};
+use crate::reconstruct::prior::SharedNetwork;
 use crate::reconstruct::{
     MatrixMethod, Method, MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction,
     Recursive, RecursiveSettings, believed_frame,
@@ -32,17 +33,18 @@ fn candidates() -> [Method; 4] {
 
 struct Auto {
     candidates: Vec<(Method, Arc<dyn Reconstruct>)>,
+    network: Option<SharedNetwork>,
 }
 
 impl Auto {
     fn new(settings: &MethodSettings) -> Result<Self, ReconstructError> {
-        let without_network = settings.network.is_none();
+        let network = settings.network.clone();
         let methods = candidates().into_iter();
         let candidates = methods
-            .filter(|method| !(without_network && *method == Method::PRIOR))
+            .filter(|method| network.is_some() || *method != Method::PRIOR)
             .map(|method| Ok((method, Arc::from(method.prepare(&settings.taken_by(method))?))))
             .collect::<Result<_, ReconstructError>>()?;
-        Ok(Self { candidates })
+        Ok(Self { candidates, network })
     }
 
     /// The index of the best method, and its picture.
@@ -51,7 +53,12 @@ impl Auto {
         measurements: &Measurements,
     ) -> Result<(usize, Reconstruction), ReconstructError> {
         let mut best: Option<(f64, usize, Reconstruction)> = None;
-        for (at, (_, method)) in self.candidates.iter().enumerate() {
+        let takes = |network: &SharedNetwork| network.get().takes(measurements.side());
+        let with_network = self.network.as_ref().is_some_and(takes);
+        for (at, (word, method)) in self.candidates.iter().enumerate() {
+            if *word == Method::PRIOR && !with_network {
+                continue;
+            }
             let made = method.reconstruct(measurements)?;
             // A method without a judgement is as good as zero filling.
             let miss = made.report.held_back.map_or(2.0, |held_back| held_back.miss);
