@@ -69,5 +69,10 @@ fn say(report: &Report) -> Result<()> {
             at.picture_snr
         ))?;
     }
-    print::line(format_args!("eyes: {} (more: nirspi safety)", report.eye_safety))
+    if let Some(refused) = &report.eye_safety_refused {
+        return print::line(format_args!("eyes: refused: {refused}"));
+    }
+    report.eye_safety.iter().try_for_each(|light| {
+        print::line(format_args!("eyes: {light} (more: nirspi safety)"))
+    })
 }

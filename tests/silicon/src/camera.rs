@@ -1,6 +1,6 @@
 //! The camera as a test has it: the machine on a thread of its own, and links of the host's library to it.
 
-use crate::chip::{Chip, Connected, OnTheBus, Ready, table};
+use crate::chip::{Chip, Connected, OnTheBus, Ready, parallel, table};
 use crate::ecp5::Ecp5;
 use crate::fpga::{Fpga, Golden};
 use crate::machine::Machine;
@@ -43,11 +43,20 @@ pub fn elf() -> PathBuf {
     )
 }
 
+/// The same with the feature `parallel`, where `bash .ci/run silicon` puts it.
+#[must_use]
+pub fn parallel_elf() -> PathBuf {
+    std::env::var_os("NIRSPI_SILICON_PARALLEL_ELF")
+        .map_or_else(|| root().join("boards/target/silicon/parallel"), PathBuf::from)
+}
+
 /// What a camera is made of.
 pub struct Plan {
     /// The FPGA, made on the machine's thread.
     pub fpga: Box<dyn FnOnce() -> Box<dyn Fpga> + Send>,
     pub plugged: bool,
+    /// The firmware with the parallel port, and its wires.
+    pub parallel: bool,
     pub on_the_bus: OnTheBus,
     pub stuck: Option<Ready>,
 }
@@ -55,7 +64,13 @@ pub struct Plan {
 impl Plan {
     /// A camera with this FPGA, a host at its cable, and no depth sensor.
     pub fn new(fpga: impl FnOnce() -> Box<dyn Fpga> + Send + 'static) -> Self {
-        Self { fpga: Box::new(fpga), plugged: true, on_the_bus: OnTheBus::Nobody, stuck: None }
+        Self {
+            fpga: Box::new(fpga),
+            plugged: true,
+            parallel: false,
+            on_the_bus: OnTheBus::Nobody,
+            stuck: None,
+        }
     }
 
     /// Makes the machine.
@@ -64,8 +79,18 @@ impl Plan {
     /// If library or ELF cannot be read.
     #[must_use]
     pub fn machine(self, library: &Path) -> Machine {
-        let source = root().join("boards").join(BOARD).join("src/pins.rs");
-        let pins = table(&std::fs::read_to_string(source).expect("the board's pins"));
+        let board = root().join("boards").join(BOARD);
+        let read =
+            |file: &str| std::fs::read_to_string(board.join(file)).expect("a file of the board");
+        let mut pins = table(&read("src/pins.rs"));
+        if self.parallel {
+            let lines = parallel(&read("README.md"));
+            // A line of the port has the pin of a lamp.
+            pins.retain(|pin| {
+                !lines.iter().any(|line| (line.port, line.bit) == (pin.port, pin.bit))
+            });
+            pins.extend(lines);
+        }
         let connected = Connected {
             pins,
             fpga: (self.fpga)(),
@@ -73,7 +98,8 @@ impl Plan {
             on_the_bus: self.on_the_bus,
             stuck: self.stuck,
         };
-        Machine::new(library, &elf(), self.plugged, connected)
+        let elf = if self.parallel { parallel_elf() } else { elf() };
+        Machine::new(library, &elf, self.plugged, connected)
             .unwrap_or_else(|error| panic!("{error}"))
     }
 }

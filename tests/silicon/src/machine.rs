@@ -134,9 +134,12 @@ impl Bus for Shared {
     }
 
     fn block(&self, address: u32, bytes: u32) -> bool {
-        let instructions = self.instructions.get() + u64::from(self.count(address, bytes));
-        self.instructions.set(instructions);
-        instructions >= self.limit.get()
+        let instructions = self.instructions.get();
+        if instructions >= self.limit.get() {
+            return true;
+        }
+        self.instructions.set(instructions + u64::from(self.count(address, bytes)));
+        false
     }
 
     fn hint(&self, address: u32) -> bool {

@@ -1,4 +1,6 @@
 mod ends;
+mod parallel;
+mod program;
 mod pulls;
 mod start;
 mod streams;

@@ -42,7 +42,7 @@ pub trait Bus {
     fn read(&self, address: u32, bytes: u32) -> u32;
     /// A write to a register.
     fn write(&self, address: u32, bytes: u32, value: u32);
-    /// A run of instructions without a branch begins. True: the processor stops behind it.
+    /// A run of instructions without a branch begins. True: the processor stops before it.
     fn block(&self, address: u32, bytes: u32) -> bool;
     /// The hint instruction at this address (`WFE`, `SEV`) is next. True: the processor stops before it.
     fn hint(&self, address: u32) -> bool;

@@ -15,7 +15,7 @@ mod small;
 mod timer;
 
 pub use clocks::Ready;
-pub use pins::{Pin, table};
+pub use pins::{Pin, parallel, table};
 pub use small::{OnTheBus, SpiDevice};
 
 use crate::fpga::Fpga;

@@ -66,6 +66,26 @@ pub fn table(source: &str) -> Vec<Pin> {
     rows.collect()
 }
 
+/// The pins of the parallel port: the rows of the table in the board's README.
+#[must_use]
+pub fn parallel(readme: &str) -> Vec<Pin> {
+    let rows = readme.lines().skip_while(|line| *line != "## Parallel port").filter_map(|line| {
+        let mut cells = line.split('|').map(str::trim).skip(1);
+        let (name, place) = (cells.next()?, cells.next()?.strip_prefix('P')?);
+        let is_line = ["data", "clock", "valid", "ready"].iter().any(|kind| name.starts_with(kind));
+        let port = place.bytes().next()?.checked_sub(b'A')?;
+        Some((port, place.get(1..)?.parse().ok()?)).filter(|_| is_line)
+    });
+    let pins = rows.zip(super::pssi::FUNCTIONS).enumerate();
+    pins.map(|(number, ((port, bit), function))| Pin {
+        name: super::pssi::line(number),
+        port: port.into(),
+        bit,
+        usage: Use::Function(function),
+    })
+    .collect()
+}
+
 /// Levels that come from outside.
 #[derive(Debug, Default)]
 pub struct Outside([[Option<bool>; 16]; 10]);

@@ -21,20 +21,14 @@ pub struct Pssi {
     pub bytes: u64,
 }
 
-/// PE3 and the others of the port, with the alternate functions of ST's data sheet.
-const PINS: &[(usize, usize, u32)] = &[
-    (2, 6, 10),
-    (2, 7, 10),
-    (2, 8, 10),
-    (2, 9, 10),
-    (2, 11, 4),
-    (3, 3, 4),
-    (4, 5, 10),
-    (4, 6, 10),
-    (3, 9, 10),
-    (3, 8, 10),
-    (4, 3, 2),
-];
+/// Lines of the port, in the order of the board's README, with their alternate functions: ST's data sheet DS13086, table 27
+/// (DCMI and PSSI share theirs; the last is TIM3's channel 1).
+pub const FUNCTIONS: [u32; 11] = [10, 10, 10, 4, 10, 4, 10, 10, 10, 10, 2];
+
+/// The name of such a line in the table of pins.
+pub fn line(number: usize) -> String {
+    format!("parallel_{number}")
+}
 
 impl Chip {
     fn receives(&self) -> bool {

@@ -49,3 +49,29 @@ fn it_passes_the_self_test_of_the_host() {
     assert!(found.passed());
     camera.assert_no_violation();
 }
+
+#[test]
+fn a_second_of_frames_at_the_highest_rate_loses_none_but_those_the_fpga_counts() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &MeasurementSetup { sweeps: 1, ..natural() });
+    let begun = std::time::Instant::now();
+    pass(&camera, 1_000.0);
+    let wall_s = begun.elapsed().as_secs_f64();
+    let status = session
+        .command(request::Stop, &mut IgnorePackets)
+        .and_then(|_| session.status(&mut IgnorePackets))
+        .unwrap();
+    println!(
+        "{} frames of 1024 patterns sent in a second of the chip, {wall_s:.2} s on the wall",
+        status.frames_sent
+    );
+    assert!(status.frames_sent > 3_000, "{status:?}");
+    assert_eq!((status.frames_dropped, status.fpga_frames_corrupt), (0, 0), "{status:?}");
+    assert_eq!(
+        status.frames_made,
+        status.frames_sent + status.fpga_frames_lost as u32,
+        "{status:?}"
+    );
+    camera.assert_no_violation();
+}
