@@ -53,8 +53,7 @@ WRAPPER
 if [ -n "${NIRSPI_FALLBACK:-}" ] || ! rustup target add "${targets[@]}" >&2; then
     fall_back
 fi
-# The same bytes wherever sources and registry lie: the place of a panic is a path.
-CARGO_ENCODED_RUSTFLAGS=--remap-path-prefix=$(cd .. && pwd)=/nirspi$'\x1f'--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=/cargo
+CARGO_ENCODED_RUSTFLAGS=$(same_bytes)
 export CARGO_ENCODED_RUSTFLAGS
 for name in "${names[@]}"; do
     (cd "$name" && cargo build --locked --release --target-dir ../target ${FEATURES:+--features "$FEATURES"} "${extra[@]}")

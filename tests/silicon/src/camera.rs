@@ -59,6 +59,8 @@ pub struct Plan {
     pub parallel: bool,
     pub on_the_bus: OnTheBus,
     pub stuck: Option<Ready>,
+    /// What becomes of a write to a register, by address and value: another value, or no write.
+    pub mutation: fn(u32, u32) -> Option<u32>,
 }
 
 impl Plan {
@@ -70,6 +72,7 @@ impl Plan {
             parallel: false,
             on_the_bus: OnTheBus::Nobody,
             stuck: None,
+            mutation: |_, value| Some(value),
         }
     }
 
@@ -97,6 +100,7 @@ impl Plan {
             configuration: Box::new(Ecp5::default()),
             on_the_bus: self.on_the_bus,
             stuck: self.stuck,
+            mutation: self.mutation,
         };
         let elf = if self.parallel { parallel_elf() } else { elf() };
         Machine::new(library, &elf, self.plugged, connected)
@@ -229,8 +233,7 @@ pub fn serve(address: &str) -> Result<(), String> {
     let library = library().ok_or("no Unicorn")?;
     let optics = nirspi::virtual_camera::VirtualOptics::new(nirspi_optics::Scene::white(), 300.0);
     let model = optics.and_then(|optics| optics.fpga(1)).map_err(|error| error.to_string())?;
-    let listener =
-        std::net::TcpListener::bind(address).map_err(|error| format!("{address}: {error}"))?;
+    let listener = TcpListener::bind(address).map_err(|error| format!("{address}: {error}"))?;
     let address = listener.local_addr().map_err(|error| error.to_string())?;
     println!("{BOARD} on a model of its chip: tcp:{address}");
     let mut machine = Plan::new(|| Box::new(Golden::new(model))).machine(&library);

@@ -114,13 +114,6 @@ impl Even {
         gateware.set_interlock(true);
         Self { gateware, clock: 0 }
     }
-
-    /// The next packet of the parallel port.
-    pub fn packet(&mut self) -> Option<Vec<u8>> {
-        let packet = self.gateware.outgoing()?;
-        self.gateware.sent();
-        Some(packet)
-    }
 }
 
 impl SimulatedFpga for Even {

@@ -166,14 +166,11 @@ pub struct Machine {
     pc: u32,
     event: bool,
     active: Option<usize>,
-    pub symbols: HashMap<String, u32>,
     /// Byte with which the stack was painted.
     stack: std::ops::Range<u32>,
     image: Vec<(u32, Vec<u8>)>,
     /// Restarts of the chip so far: time in microseconds, cause, where the processor was.
     pub resets: Vec<(u64, Cause, u32)>,
-    /// Instructions of the start-up before `main`, and when `main` began.
-    pub instructions: u64,
 }
 
 const PAINT: u8 = 0xA5;
@@ -232,24 +229,15 @@ impl Machine {
             .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
             .collect();
         let stack = symbols.get("_stack_end").copied().unwrap_or(RAM)..symbols["_stack_start"];
-        let mut machine = Self {
-            processor,
-            pc: 0,
-            event: false,
-            active: None,
-            symbols,
-            stack,
-            image,
-            resets: Vec::new(),
-            instructions: 0,
-        };
+        let mut machine =
+            Self { processor, pc: 0, event: false, active: None, stack, image, resets: Vec::new() };
         machine.power_up();
         Ok(machine)
     }
 
     fn power_up(&mut self) {
         let memory = self.processor.memory();
-        let mut write = |address: u32, bytes: &[u8]| assert!(memory.put(address, bytes), "memory");
+        let write = |address: u32, bytes: &[u8]| assert!(memory.put(address, bytes), "memory");
         write(FLASH, &vec![0xFF; FLASH_BYTES]);
         for (address, bytes) in &self.image {
             write(*address, bytes);
@@ -291,12 +279,6 @@ impl Machine {
     #[must_use]
     pub fn now_us(&self) -> f64 {
         self.bus().now() as f64 / 1e6
-    }
-
-    /// Instructions since power-up.
-    #[must_use]
-    pub fn instructions(&self) -> u64 {
-        self.bus().instructions.get()
     }
 
     /// The memory, for a look into it.

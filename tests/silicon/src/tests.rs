@@ -1,4 +1,5 @@
 mod ends;
+mod faults;
 mod parallel;
 mod program;
 mod pulls;

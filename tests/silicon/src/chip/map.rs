@@ -68,11 +68,8 @@ pub mod irq {
     pub const GPDMA1_CHANNEL8: usize = 80;
     pub const TIM3: usize = 46;
     pub const I2C1_EV: usize = 55;
-    pub const I2C1_ER: usize = 56;
     pub const TIM15: usize = 69;
     pub const OTG_HS: usize = 73;
-    /// One more than the last.
-    pub const COUNT: usize = 141;
 }
 
 const TIMER: &[(u32, &str, u32)] = &[

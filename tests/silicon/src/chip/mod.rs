@@ -49,6 +49,8 @@ pub struct Connected {
     pub configuration: Box<dyn SpiDevice>,
     pub on_the_bus: OnTheBus,
     pub stuck: Option<Ready>,
+    /// What becomes of a write to a register, in a test of the rules: another value, or no write.
+    pub mutation: fn(u32, u32) -> Option<u32>,
 }
 
 /// The chip.
@@ -77,6 +79,7 @@ pub struct Chip {
     fpga_looked_ps: u64,
     rising: clocks::Rising,
     pub stuck: Option<Ready>,
+    mutation: fn(u32, u32) -> Option<u32>,
     pub supply_millivolts: u32,
     core: f64,
     /// The processor's clock has changed.
@@ -124,7 +127,7 @@ impl Chip {
     /// After power-up.
     #[must_use]
     pub fn new(memory: Memory, usb: Usb, connected: Connected) -> Self {
-        let Connected { pins, fpga, configuration, on_the_bus, stuck } = connected;
+        let Connected { pins, fpga, configuration, on_the_bus, stuck, mutation } = connected;
         let mut chip = Self {
             now: 0,
             values: HashMap::new(),
@@ -148,6 +151,7 @@ impl Chip {
             fpga_looked_ps: 0,
             rising: clocks::Rising::new(),
             stuck,
+            mutation,
             supply_millivolts: 3300,
             core: 4e6,
             clock_changed: false,
@@ -289,6 +293,7 @@ impl Chip {
 
     /// The processor writes.
     pub fn write(&mut self, address: u32, bytes: u32, value: u32) {
+        let Some(value) = (self.mutation)(address, value) else { return };
         if address >= CORE && !(0xE004_4000..0xE004_5000).contains(&address) {
             self.write_system(address, bytes, value);
             return;

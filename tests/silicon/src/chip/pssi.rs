@@ -82,11 +82,10 @@ impl Chip {
         self.fpga.advance(self.now);
         let sent = self.fpga.parallel(bytes);
         if !sent.is_empty() {
-            for (port, bit, function) in PINS {
-                if self.function(*port, *bit) != Some(*function) {
+            for number in 0..FUNCTIONS.len() {
+                if !self.is_connected(&line(number)) {
                     self.violation(format!(
-                        "P{}{bit} has not function {function}, the parallel port's",
-                        (b'A' + *port as u8) as char
+                        "line {number} of the parallel port has not its alternate function"
                     ));
                 }
             }

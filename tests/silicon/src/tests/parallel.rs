@@ -49,7 +49,7 @@ fn a_cable_pulled_while_the_parallel_port_streams_leaves_it_dark_and_ready() {
     let Some(camera) = with_lines() else { return };
     for pull in 0..10 {
         let mut session = Session::open(camera.link()).unwrap();
-        assert!(session.register(Register::Version.address(), &mut IgnorePackets).is_ok());
+        assert!(session.register(Register::Version, &mut IgnorePackets).is_ok());
         start(&mut session, &setup());
         pass(&camera, 3.0 + f64::from(pull));
         let plug = |plugged| {

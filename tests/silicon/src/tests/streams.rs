@@ -50,28 +50,29 @@ fn it_passes_the_self_test_of_the_host() {
     camera.assert_no_violation();
 }
 
+/// Up to the signal meter's second look, a quarter of a second after its first: where the FPGA loses frames, the meter then
+/// reads every packet (`docs/silicon.md`, What the runs found).
 #[test]
-fn a_second_of_frames_at_the_highest_rate_loses_none_but_those_the_fpga_counts() {
+fn frames_of_1024_patterns_come_as_fast_as_the_firmwares_page_computes() {
     let Some(camera) = connected_as(even()) else { return };
     let mut session = Session::open(camera.link()).unwrap();
     start(&mut session, &MeasurementSetup { sweeps: 1, ..natural() });
-    let begun = std::time::Instant::now();
-    pass(&camera, 1_000.0);
-    let wall_s = begun.elapsed().as_secs_f64();
-    let status = session
-        .command(request::Stop, &mut IgnorePackets)
-        .and_then(|_| session.status(&mut IgnorePackets))
-        .unwrap();
+    let sent = |camera: &Camera| {
+        camera.with(|machine| machine.chip(|chip| chip.octospi.counts.get(&0x8B).copied()))
+    };
+    pass(&camera, 50.0);
+    let (before, begun) = (sent(&camera).unwrap(), std::time::Instant::now());
+    pass(&camera, 150.0);
+    let per_s = (sent(&camera).unwrap() - before) as f64 / 0.15;
     println!(
-        "{} frames of 1024 patterns sent in a second of the chip, {wall_s:.2} s on the wall",
-        status.frames_sent
+        "{per_s:.0} frames/s of 1024 patterns; 0.15 s of the chip took {:.2} s",
+        begun.elapsed().as_secs_f64()
     );
-    assert!(status.frames_sent > 3_000, "{status:?}");
+    // The page's table computes 5968 with 24-bit samples, without the signal meter.
+    assert!((per_s / 5968.0 - 1.0).abs() < 0.05, "{per_s}");
+    session.command(request::Stop, &mut IgnorePackets).unwrap();
+    let status = session.status(&mut IgnorePackets).unwrap();
     assert_eq!((status.frames_dropped, status.fpga_frames_corrupt), (0, 0), "{status:?}");
-    assert_eq!(
-        status.frames_made,
-        status.frames_sent + status.fpga_frames_lost as u32,
-        "{status:?}"
-    );
+    assert_eq!(status.frames_made, status.frames_sent + status.fpga_frames_lost, "{status:?}");
     camera.assert_no_violation();
 }
