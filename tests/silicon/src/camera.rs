@@ -59,6 +59,8 @@ pub struct Plan {
     pub parallel: bool,
     pub on_the_bus: OnTheBus,
     pub stuck: Option<Ready>,
+    /// Bytes of stack that the processor begins with, in place of all.
+    pub stack_room: Option<u32>,
     /// What becomes of a write to a register, by address and value: another value, or no write.
     pub mutation: fn(u32, u32) -> Option<u32>,
 }
@@ -72,6 +74,7 @@ impl Plan {
             parallel: false,
             on_the_bus: OnTheBus::Nobody,
             stuck: None,
+            stack_room: None,
             mutation: |_, value| Some(value),
         }
     }
@@ -103,7 +106,7 @@ impl Plan {
             mutation: self.mutation,
         };
         let elf = if self.parallel { parallel_elf() } else { elf() };
-        Machine::new(library, &elf, self.plugged, connected)
+        Machine::new(library, &elf, self.plugged, self.stack_room, connected)
             .unwrap_or_else(|error| panic!("{error}"))
     }
 }

@@ -166,8 +166,10 @@ pub struct Machine {
     pc: u32,
     event: bool,
     active: Option<usize>,
-    /// Byte with which the stack was painted.
+    /// Where the stack may be.
     stack: std::ops::Range<u32>,
+    /// Bytes of stack to begin with, in place of all.
+    stack_room: Option<u32>,
     image: Vec<(u32, Vec<u8>)>,
     /// Restarts of the chip so far: time in microseconds, cause, where the processor was.
     pub resets: Vec<(u64, Cause, u32)>,
@@ -184,6 +186,7 @@ impl Machine {
         library: &Path,
         elf: &Path,
         plugged: bool,
+        stack_room: Option<u32>,
         connected: Connected,
     ) -> Result<Self, String> {
         let bytes = std::fs::read(elf).map_err(|error| format!("{}: {error}", elf.display()))?;
@@ -229,8 +232,16 @@ impl Machine {
             .filter_map(|symbol| Some((symbol.name().ok()?.to_owned(), symbol.address() as u32)))
             .collect();
         let stack = symbols.get("_stack_end").copied().unwrap_or(RAM)..symbols["_stack_start"];
-        let mut machine =
-            Self { processor, pc: 0, event: false, active: None, stack, image, resets: Vec::new() };
+        let mut machine = Self {
+            processor,
+            pc: 0,
+            event: false,
+            active: None,
+            stack,
+            stack_room,
+            image,
+            resets: Vec::new(),
+        };
         machine.power_up();
         Ok(machine)
     }
@@ -254,6 +265,7 @@ impl Machine {
     fn start(&mut self) {
         let memory = self.processor.memory();
         let (stack, entry) = (memory.word(FLASH), memory.word(FLASH + 4));
+        let stack = self.stack_room.map_or(stack, |room| self.stack.start + room);
         self.processor.set(Register::Control, 0, 0);
         self.processor.set(Register::Primask, 0, 0);
         self.processor.set(Register::Xpsr, 0, 1 << 24);

@@ -100,3 +100,50 @@ fn every_planted_fault_is_seen() {
     // Without a fault nothing is seen.
     assert_eq!(seen(|_, value| Some(value)).unwrap(), "");
 }
+
+#[test]
+fn a_list_of_the_dma_that_leads_astray_is_seen() {
+    let Some(camera) = parallel::with_lines(|at, v| {
+        // The first link leads to the third item.
+        Some(if at == channel(3, 0x7C) && v != 0 { v + 12 } else { v })
+    }) else {
+        return;
+    };
+    let mut session = Session::open(camera.link()).unwrap();
+    let options = CaptureOptions {
+        setup: parallel::setup(),
+        frames: Some(50),
+        calibration: Calibration::None,
+        record: None,
+    };
+    let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(()));
+    let counters = captured.map(|captured| captured.counters);
+    println!("{counters:?}");
+    assert!(!counters.is_ok_and(|counters| counters.is_complete()));
+}
+
+#[test]
+fn a_crash_that_lowers_another_pin_is_seen() {
+    let mutation = |at, v| Some(if at == GPIO + 0x1418 && v == 1 << 30 { 1 << 29 } else { v });
+    let Some(camera) = connected_as(Plan { mutation, ..even() }) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &natural());
+    pass(&camera, 2.0);
+    assert!(ends::dark_after_a_crash_us(&camera) > ends::AT_ONCE_US);
+}
+
+#[test]
+fn a_stack_that_is_too_deep_ends_in_a_fault_and_a_restart_in_the_dark() {
+    // Less than the 6048 bytes that the firmware takes.
+    let Some(camera) = Camera::start(Plan { stack_room: Some(4_000), ..even() }) else { return };
+    let (resets, lit) = camera.with(|machine| {
+        machine.run_while(300_000.0, |_| false);
+        (machine.resets.clone(), machine.chip(|chip| chip.light_log.clone()))
+    });
+    println!("{} restarts", resets.len());
+    assert!(
+        resets.iter().any(|(_, cause, _)| *cause == crate::chip::Cause::Software),
+        "{resets:?}"
+    );
+    assert!(lit.is_empty());
+}
