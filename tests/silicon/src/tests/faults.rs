@@ -29,9 +29,14 @@ fn seen(mutation: fn(u32, u32) -> Option<u32>) -> Option<String> {
     } else {
         found.push("no session".to_owned());
     }
+    // Longer than the watchdog's time.
+    pass(&camera, 600.0);
     let (violations, resets) =
         camera.with(|machine| (machine.violations(), machine.resets.clone()));
     found.extend(violations);
+    if resets.is_empty() {
+        found.extend(camera.with(|machine| machine.chip(|chip| chip.wrong_pins())));
+    }
     found.extend(resets.iter().map(|(us, cause, _)| format!("restart by {cause:?} at {us} us")));
     Some(found.join("; "))
 }
@@ -90,7 +95,7 @@ fn every_planted_fault_is_seen() {
             |at, v| Some(v).filter(|v| (at, *v) != (0x4000_3000, 0xAAAA)),
             "restart by Watchdog",
         ),
-        ("pin", |at, v| Some(if at == GPIO + 0x1400 { v & !(3 << 26) } else { v }), "P"),
+        ("pin", |at, v| Some(if at == GPIO + 0x1400 { v & !(3 << 28) } else { v }), "P"),
     ];
     for (name, mutation, expected) in faults {
         let Some(found) = seen(mutation) else { return };
