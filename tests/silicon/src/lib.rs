@@ -1,4 +1,5 @@
 //! The released ELF of a board on a model of its chip: `docs/silicon.md`.
+#![cfg_attr(not(test), expect(dead_code, reason = "the tests use all of this, the program a part"))]
 
 mod camera;
 mod chip;

@@ -200,8 +200,8 @@ impl Host {
 
     async fn wait_us(&self, us: u64) {
         let until = self.cable.now.get() + us * 1_000_000;
-        while self.cable.now.get() < until {
-            self.cable.wait_ps.set(until - self.cable.now.get());
+        while let left @ 1.. = until.saturating_sub(self.cable.now.get()) {
+            self.cable.wait_ps.set(left);
             step().await;
         }
     }
@@ -232,6 +232,13 @@ impl Host {
         self.cable.to_device.borrow_mut().clear();
         self.cable.from_device.borrow_mut().clear();
         self.cable.configured.set(true);
+        self.wait_us(500).await;
+        let sizes = self.core.borrow().packet_bytes(1);
+        if sizes != [512; 2] {
+            self.complain(format!(
+                "endpoint 1 has {sizes:?} bytes in the core, the descriptor 512"
+            ));
+        }
         self.talk().await
     }
 
@@ -331,20 +338,20 @@ impl Host {
         self.until(|core, host| (core.setup(host, request) != Answer::Silence).then_some(()))
             .await?;
         let mut data = Vec::new();
-        while kind & 0x80 != 0 {
+        let is_to_host = kind & 0x80 != 0;
+        let mut is_done = !is_to_host;
+        while !is_done {
             let answer = self.until(|core, host| told(core.fetch(host, 0, true))).await?;
             let Some(bytes) = answer else { return Ok(None) };
             data.extend(&bytes);
-            if bytes.len() < 64 || data.len() >= length {
-                break;
-            }
+            is_done = bytes.len() < 64 || data.len() >= length;
         }
         // The core of this model takes a new address at once, a real one after the status stage.
         if [kind, code] == [0x00, 5] {
             self.wait_us(50).await;
             self.address = address;
         }
-        let status = if kind & 0x80 != 0 {
+        let status = if is_to_host {
             self.until(|core, host| told(core.send(host, 0, &[], 1))).await?
         } else {
             self.until(|core, host| told(core.fetch(host, 0, true))).await?
@@ -387,10 +394,10 @@ impl Host {
                 worked |= self.take()?;
             }
             if worked {
-                self.quickly().await
+                self.quickly().await;
             } else {
                 self.cable.wait_ps.set(MICROFRAME_PS / 4);
-                step().await
+                step().await;
             }
         }
     }

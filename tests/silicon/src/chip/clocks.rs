@@ -83,13 +83,13 @@ impl Chip {
             }
             0x1C if (before ^ value) & 3 != 0 => self.switch_clock(value & 3),
             0x20 if value & 0x77F != 0 => {
-                self.violation(format!("RCC.CFGR2 {value:#x}: a bus has a prescaler"))
+                self.violation(format!("RCC.CFGR2 {value:#x}: a bus has a prescaler"));
             }
             0x24 if value & 0x70 != 0 => {
-                self.violation(format!("RCC.CFGR3 {value:#x}: a bus has a prescaler"))
+                self.violation(format!("RCC.CFGR3 {value:#x}: a bus has a prescaler"));
             }
             0xE4 if value >> 20 & 3 != 0 => {
-                self.violation("OCTOSPI's clock is not the core's".into())
+                self.violation("OCTOSPI's clock is not the core's".into());
             }
             0xF0 => self.rises(Ready("RCC.BDCR", 27), value >> 26 & 1 == 1, 130 * US),
             _ => {}

@@ -126,14 +126,18 @@ impl Chip {
                 format!("memory at {destination:#x}"),
             );
             law(
-                destination % to == 0 && bytes % to == 0,
+                destination % to == 0 && bytes.is_multiple_of(to),
                 format!("{bytes} bytes at {destination:#x} in units of {to}"),
             );
-            law(bytes % from == 0 && bytes > 0, format!("{bytes} bytes in units of {from}"));
+            law(
+                bytes.is_multiple_of(from) && bytes > 0,
+                format!("{bytes} bytes in units of {from}"),
+            );
             // Two channels with streams of their own would wait for each other at the same priority.
             law(self.dma(channel, CCR) >> 22 & 3 == 3, "not at the highest priority".into());
         }
-        let alignment = !(destination % to == 0 && bytes % to == 0 && bytes % from == 0);
+        let alignment =
+            !(destination % to == 0 && bytes.is_multiple_of(to) && bytes.is_multiple_of(from));
         if expected.is_some() && alignment {
             self.channels[channel].status |= USER_ERROR | 1;
             self.set(at(channel, CCR), self.dma(channel, CCR) & !EN);

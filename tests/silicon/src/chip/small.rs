@@ -113,7 +113,7 @@ impl Chip {
                 _ => self.violation(format!("IWDG.KR {value:#x}")),
             },
             _ if !watchdog.unlocked => {
-                self.violation("the watchdog's setting is written while locked".into())
+                self.violation("the watchdog's setting is written while locked".into());
             }
             0x04 => watchdog.prescaler = value,
             0x08 => watchdog.reload = value.into(),

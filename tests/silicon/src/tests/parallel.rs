@@ -54,7 +54,7 @@ fn a_cable_pulled_while_the_parallel_port_streams_leaves_it_dark_and_ready() {
         start(&mut session, &setup());
         pass(&camera, 3.0 + f64::from(pull));
         let plug = |plugged| {
-            camera.with(move |machine| machine.chip(|chip| chip.usb.cable.plugged.set(plugged)))
+            camera.with(move |machine| machine.chip(|chip| chip.usb.cable.plugged.set(plugged)));
         };
         plug(false);
         pass(&camera, 12.0);
