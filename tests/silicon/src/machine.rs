@@ -71,8 +71,8 @@ pub struct Shared {
     base: Cell<u64>,
     instruction_ps: Cell<f64>,
     code: Vec<u8>,
-    /// Instructions of the blocks seen, by address and length.
-    counts: RefCell<HashMap<(u32, u32), u32>>,
+    /// Bytes and instructions of the block that was seen last at each half word of the code.
+    counts: RefCell<Vec<(u32, u32)>>,
     unmapped: Cell<u32>,
 }
 
@@ -99,18 +99,28 @@ impl Shared {
     }
 
     fn count(&self, address: u32, bytes: u32) -> u32 {
-        *self.counts.borrow_mut().entry((address, bytes)).or_insert_with(|| {
-            let from = address.wrapping_sub(FLASH) as usize;
-            let Some(code) = self.code.get(from..from + bytes as usize) else { return bytes / 2 };
-            let (mut at, mut count) = (0, 0);
-            while at + 1 < code.len() {
-                // ARMv8-M ARM, C2.2: words of 32 bits begin with 0b11101, 0b11110 or 0b11111.
-                at += if code[at + 1] >> 3 >= 0b11101 { 4 } else { 2 };
-                count += 1;
-            }
-            count
-        })
+        let from = address.wrapping_sub(FLASH) as usize;
+        let mut counts = self.counts.borrow_mut();
+        let (Some(known), Some(code)) =
+            (counts.get_mut(from / 2), self.code.get(from..from + bytes as usize))
+        else {
+            return bytes / 2;
+        };
+        if known.0 != bytes {
+            *known = (bytes, instructions_of(code));
+        }
+        known.1
     }
+}
+
+/// Instructions in this code. Words of 32 bits begin with 0b11101, 0b11110 or 0b11111 (ARMv8-M ARM, C2.2).
+fn instructions_of(code: &[u8]) -> u32 {
+    let (mut at, mut count) = (0, 0);
+    while at + 1 < code.len() {
+        at += if code[at + 1] >> 3 >= 0b11101 { 4 } else { 2 };
+        count += 1;
+    }
+    count
 }
 
 impl Bus for Shared {
@@ -212,8 +222,8 @@ impl Machine {
             base_ps: Cell::new(0),
             base: Cell::new(0),
             instruction_ps: Cell::new(CLOCKS_AN_INSTRUCTION * 1e12 / 4e6),
+            counts: RefCell::new(vec![(0, 0); flash.len() / 2 + 1]),
             code: flash,
-            counts: RefCell::new(HashMap::new()),
             unmapped: Cell::new(0),
         })?;
         let mut image = Vec::new();

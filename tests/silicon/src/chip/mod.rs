@@ -57,7 +57,7 @@ pub struct Connected {
 pub struct Chip {
     /// Time since power-up in picoseconds.
     pub now: u64,
-    values: HashMap<u32, u32>,
+    values: HashMap<u32, u32, foldhash::fast::FixedState>,
     pub memory: Memory,
     pub nvic: Nvic,
     pub violations: Vec<String>,
@@ -86,8 +86,6 @@ pub struct Chip {
     pub clock_changed: bool,
     pub reset: Option<Cause>,
     pub fault_status: u32,
-    /// Registers that were touched, for the report.
-    pub touched: BTreeMap<u32, u64>,
     /// Light must be off from then on, until something allows it.
     dark_ps: Option<u64>,
     /// When the LEDs' enable last rose or fell.
@@ -130,7 +128,7 @@ impl Chip {
         let Connected { pins, fpga, configuration, on_the_bus, stuck, mutation } = connected;
         let mut chip = Self {
             now: 0,
-            values: HashMap::new(),
+            values: HashMap::default(),
             memory,
             nvic: Nvic::default(),
             violations: Vec::new(),
@@ -157,7 +155,6 @@ impl Chip {
             clock_changed: false,
             reset: None,
             fault_status: 0,
-            touched: BTreeMap::new(),
             dark_ps: Some(0),
             light_log: Vec::new(),
         };
@@ -213,8 +210,6 @@ impl Chip {
 
     /// The peripheral of an access, if the access is allowed.
     fn admit(&mut self, address: u32, bytes: u32, writes: bool) -> Option<(Part, u32)> {
-        let word = address & !3;
-        *self.touched.entry(word).or_default() += 1;
         let verb = if writes { "written" } else { "read" };
         let Some(block) = map::block(address) else {
             self.violation(format!("{address:#010x} {verb}: no peripheral that is modelled"));
