@@ -2,6 +2,7 @@
 
 use nirspi::imaging::{Enhance, ImageContext, White, warnings};
 use nirspi::picture::{Panel, SideBySide, Unit};
+use nirspi::provenance::{Made, Taken};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{CameraModel, VirtualOptics, calibrate_against_white, shoot};
@@ -26,8 +27,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let context = ImageContext { rows: Some(measurements.rows()), ..ImageContext::default() };
     let picture = networks.enhance(&image, White::Brightest, &context)?;
     warnings(&picture).iter().for_each(|warning| eprintln!("warning: {warning}"));
+    let made = Made::now("first_picture", None, std::env::args());
+    let provenance = Taken::by(shot.session.identity()).made(&made);
     let panel = Panel::square("enhanced (simulated)", 64, &picture.pixels, Unit::OfWhite);
-    std::fs::write("letter.png", SideBySide::from(panel).png())?;
+    std::fs::write("letter.png", SideBySide::from(panel).png(&provenance))?;
     println!("blur {:.2} px, inconsistency {:.2}", picture.blur_px, picture.inconsistency);
     Ok(())
 }

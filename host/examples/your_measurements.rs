@@ -1,8 +1,9 @@
 //! Opens a measurement file or a recording and compares every method on the first 30 % of its patterns.
 
 use nirspi::source::{FirstPatterns, Source, SourceOptions};
+use nirspi_nets::prior;
 use nirspi_recon::metrics::correlation;
-use nirspi_recon::reconstruct::{Method, MethodSettings, hadamard};
+use nirspi_recon::reconstruct::{Method, hadamard};
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,7 +14,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (used, order) = FirstPatterns::LowestSequencies.take(&source.measurements, 0.3)?;
     println!("{} patterns in the order {order}; correlation with all of them:", used.rows().len());
     for method in Method::ALL {
-        let image = method.prepare(&MethodSettings::default())?.reconstruct(&used)?.image;
+        let image = match method.prepare(&prior::settings())?.reconstruct(&used) {
+            Ok(made) => made.image,
+            Err(why) => {
+                println!("{:<16} {why}", method.argument());
+                continue;
+            }
+        };
         let side = image.side().pixels();
         let likeness = correlation(all.pixels(), image.pixels(), side, side)?;
         println!("{:<16} {likeness:.3}", method.argument());

@@ -28,6 +28,8 @@ def demo(program, folder, scene, method, share, frames, distance_m):
         "--method": method,
         "--sampling": share,
         "--frames": frames,
+        "--sweeps": 1,
+        "--rain": "none",
         "--distance-m": distance_m,
         "--out": folder,
     }

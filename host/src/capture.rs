@@ -27,7 +27,7 @@ use crate::calibration::{CalibrationError, Settling};
 use crate::clock::Instant;
 use crate::integrate::Integrated;
 use crate::recording::Target;
-use crate::session::{Session, SessionError};
+use crate::session::{CameraIdentity, Session, SessionError};
 use crate::setup::MeasurementSetup;
 use crate::tally::DetectorTally;
 use nirspi_wire::{DeviceMessage, Fault, Frame, Status};
@@ -129,6 +129,8 @@ impl Ended {
 /// The result of a capture.
 #[derive(Debug)]
 pub struct Capture {
+    /// The camera.
+    pub camera: CameraIdentity,
     /// The setup of the measurement.
     pub setup: MeasurementSetup,
     /// LED and amplifier response used for leak correction; `None` with [`Calibration::None`].

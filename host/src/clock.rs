@@ -20,6 +20,31 @@ pub fn since_1970() -> Duration {
     return page::now();
 }
 
+/// Year, month, day, hour, minute and second of a moment, in UTC. The Gregorian calendar is computed
+/// with years that begin in March, so that a leap day is the last day of a year (H. Hinnant,
+/// *chrono-Compatible Low-Level Date Algorithms*, `civil_from_days`).
+pub(crate) fn calendar(unix_s: u64) -> [u64; 6] {
+    // Days from 1 March of year 0 to 1 January 1970; an era is 400 years.
+    const DAYS_BEFORE_1970: u64 = 719_468;
+    const DAYS_OF_ERA: u64 = 146_097;
+    let (days, seconds) = (unix_s / 86_400 + DAYS_BEFORE_1970, unix_s % 86_400);
+    let (era, day) = (days / DAYS_OF_ERA, days % DAYS_OF_ERA);
+    let year = (day - day / 1460 + day / 36_524 - day / (DAYS_OF_ERA - 1)) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month_from_march = (5 * day + 2) / 153;
+    let day = day - (153 * month_from_march + 2) / 5 + 1;
+    let month = (month_from_march + 2) % 12 + 1;
+    let year = era * 400 + year + u64::from(month <= 2);
+    [year, month, day, seconds / 3600, seconds / 60 % 60, seconds % 60]
+}
+
+/// A moment in UTC as RFC 3339 writes it: `2026-11-25T08:30:00Z`.
+#[must_use]
+pub fn rfc3339(unix_s: u64) -> String {
+    let [year, month, day, hour, minute, second] = calendar(unix_s);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+}
+
 #[cfg(target_family = "wasm")]
 mod page {
     use std::ops::{Add, AddAssign};
@@ -79,5 +104,16 @@ mod page {
         fn add_assign(&mut self, time: Duration) {
             self.0 += time;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moment_is_written_as_rfc_3339_says() {
+        assert_eq!(rfc3339(0), "1970-01-01T00:00:00Z");
+        assert_eq!(rfc3339(1_709_251_199), "2024-02-29T23:59:59Z");
     }
 }

@@ -1,10 +1,13 @@
 //! Makes measurements of frames: sums the frames of a run, corrects the settling leak, and assigns
 //! the rows.
 
+mod spread;
+
 use crate::calibration::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{LeakError, MeasurementError, Measurements, Sweep};
 use nirspi_wire::{Frame, FrameFlags};
+use spread::Spread;
 use std::collections::VecDeque;
 
 /// The sum of the frames of one run, in ADC counts.
@@ -14,6 +17,7 @@ pub struct Integrated {
     frames: u64,
     sweeps: u64,
     flags: FrameFlags,
+    spread: Spread,
 }
 
 impl Integrated {
@@ -24,13 +28,19 @@ impl Integrated {
     }
 
     pub(crate) fn of_patterns(patterns: usize) -> Self {
-        Self { sums: vec![0; patterns], frames: 0, sweeps: 0, flags: FrameFlags::default() }
+        Self {
+            sums: vec![0; patterns],
+            frames: 0,
+            sweeps: 0,
+            flags: FrameFlags::default(),
+            spread: Spread::default(),
+        }
     }
 
     /// A sum that another program made: of this many frames, which sum this many sweeps together.
     #[must_use]
     pub fn of_sums(sums: Vec<i64>, frames: u64, sweeps: u64) -> Self {
-        Self { sums, frames, sweeps, flags: FrameFlags::default() }
+        Self { sums, frames, sweeps, ..Self::of_patterns(0) }
     }
 
     /// Number of patterns of a sweep.
@@ -47,6 +57,11 @@ impl Integrated {
 
     /// Adds one frame that [fits](Self::fits).
     pub fn add(&mut self, frame: &Frame<'_>) {
+        self.spread.add(frame.samples.iter(), u64::from(frame.sweeps));
+        self.add_sums(frame);
+    }
+
+    fn add_sums(&mut self, frame: &Frame<'_>) {
         for (sum, sample) in self.sums.iter_mut().zip(frame.samples.iter()) {
             *sum = sum.saturating_add(sample);
         }
@@ -92,7 +107,15 @@ impl Integrated {
         self.sums.iter().map(|&sum| sum as f64 * scale).collect()
     }
 
-    /// Measurements in ADC counts. With the camera's response, the dark level is subtracted from
+    /// Standard deviation of the noise of each of the [means](Self::means), in ADC counts, from what
+    /// differs between the frames; `None` for fewer than two frames.
+    #[must_use]
+    pub fn noise(&self, setup: &MeasurementSetup) -> Option<f64> {
+        let of_a_sweep = self.spread.of_a_sweep()?;
+        Some(of_a_sweep / (self.sweeps as f64).sqrt() / f64::from(setup.window()))
+    }
+
+    /// Measurements in ADC counts, with their [noise](Self::noise). With the camera's response, the dark level is subtracted from
     /// single readings, and the leak between slots is corrected unless `keep_leak`. Without the
     /// response the dark level is estimated.
     ///
@@ -125,11 +148,13 @@ impl Integrated {
             .filter(|_| !keep_leak)
             .map(|settling| settling.leak(setup.clocks_per_pattern, setup.blanked))
             .transpose()?;
+        let noise = self.noise(setup);
         if setup.differential {
             if let Some(leak) = &leak {
                 leak.correct_differential(&mut values);
             }
-            return Ok(Measurements::from_differential(&setup.rows, &values)?);
+            let measurements = Measurements::from_differential(&setup.rows, &values)?;
+            return with_noise(measurements, noise);
         }
         let dark = settling.filter(|_| detector == 0).map(|settling| settling.dark_counts);
         values.iter_mut().for_each(|value| *value -= dark.unwrap_or(0.0));
@@ -140,7 +165,19 @@ impl Integrated {
         if dark.is_none() {
             measurements.remove_dark_level();
         }
-        Ok(measurements)
+        // A measurement of single readings is twice a reading less the all-on one, whose noise is the
+        // same in all.
+        with_noise(measurements, noise.map(|noise| 2.0 * noise))
+    }
+}
+
+fn with_noise(
+    measurements: Measurements,
+    noise: Option<f64>,
+) -> Result<Measurements, IntegrateError> {
+    match noise {
+        None => Ok(measurements),
+        Some(noise) => Ok(measurements.with_noise(noise)?),
     }
 }
 
@@ -171,8 +208,8 @@ impl Newest {
             self.total.sweeps -= oldest.sweeps;
         }
         let mut alone = Integrated::of_patterns(self.total.sums.len());
-        alone.add(frame);
-        self.total.add(frame);
+        alone.add_sums(frame);
+        self.total.add_sums(frame);
         self.frames.push_back(alone);
     }
 
@@ -181,7 +218,11 @@ impl Newest {
     pub fn sum(&self) -> Integrated {
         // Flags cannot be subtracted, so they are collected anew.
         let flags = self.frames.iter().fold(FrameFlags::default(), |all, f| all.with(f.flags));
-        Integrated { flags, ..self.total.clone() }
+        let mut spread = Spread::default();
+        for frame in &self.frames {
+            spread.add(frame.sums.iter().copied(), frame.sweeps);
+        }
+        Integrated { flags, spread, ..self.total.clone() }
     }
 }
 
@@ -230,6 +271,7 @@ mod tests {
                 let sum = newest.sum();
                 prop_assert_eq!(sum.frames(), kept as u64);
                 prop_assert_eq!(sum.means(&setup), expected.means(&setup));
+                prop_assert_eq!(sum.noise(&setup), expected.noise(&setup));
                 prop_assert_eq!(sum.warnings(), expected.warnings());
             }
         }

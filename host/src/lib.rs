@@ -23,6 +23,7 @@
 //!   the finest detail, [`legibility`] reads characters,
 //! * [`imaging`] scales, enhances and judges images, and gives warnings,
 //! * [`serve`] shows a camera live on a web page,
+//! * [`provenance`] says where readings come from and what made a file of them,
 //! * [`causes`] prints an error with its causes, [`clock`] says the time, [`heartbeat`] gives signs of life of long work, [`stage_times`]
 //!   measures it,
 //! * [`training`] makes pairs for training networks, with the virtual camera,
@@ -62,6 +63,7 @@ pub mod events;
 pub mod example;
 #[cfg(not(target_family = "wasm"))]
 pub mod export;
+pub mod exposure;
 pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
@@ -78,6 +80,7 @@ pub mod link;
 mod parquet;
 #[cfg(feature = "pictures")]
 pub mod picture;
+pub mod provenance;
 #[cfg(not(target_family = "wasm"))]
 pub mod reconstruct;
 pub mod recording;

@@ -267,6 +267,7 @@ fn shrink(map: Reflectance, size_px: usize) -> Reflectance {
 mod tests {
     use super::*;
     use crate::files::image::encode_grey;
+    use crate::provenance::tests::provenance;
 
     fn line(scene: &str) -> String {
         let line = scene.parse::<SceneSource>().unwrap_err().to_string();
@@ -335,7 +336,7 @@ mod tests {
         // Stripes of one pixel are too fine for 8 pixels, so they must become grey instead of false
         // bands.
         let stripes: Vec<f32> = (0..64 * 64).map(|at| (at % 2) as f32).collect();
-        std::fs::write(&path, encode_grey(64, 64, &stripes)).unwrap();
+        std::fs::write(&path, encode_grey(64, 64, &stripes, &provenance())).unwrap();
         let scene = path.to_str().unwrap().parse::<SceneSource>().unwrap();
         let small = scene.load(8).unwrap();
         assert_eq!((small.name.as_str(), small.size_px, small.side_mm), ("stripes.png", 8, None));

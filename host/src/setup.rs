@@ -112,6 +112,13 @@ impl MeasurementSetup {
         self.rows.len() as u64 * halves * u64::from(self.clocks_per_pattern)
     }
 
+    /// The number of sweeps that take about as long as one sweep of all patterns. Frames of so many
+    /// sweeps come as fast, and take as much light, as frames of all patterns.
+    #[must_use]
+    pub fn sweeps_as_long_as_all(&self) -> u32 {
+        (f64::from(PATTERNS) / self.rows.len() as f64).round() as u32
+    }
+
     /// Duration of one frame at the ADC's rate.
     #[must_use]
     pub fn frame_ns(&self) -> f64 {

@@ -4,14 +4,21 @@ use crate::account::LossCounters;
 use crate::calibration::{FlatField, KeptFlatField};
 use crate::capture::Capture;
 use crate::files::FileError;
-use crate::files::measurement::{self, MeasurementFile, Readings, Reference, Selection};
+use crate::files::measurement::{self, Form, MeasurementFile, Readings, Reference, Selection};
 use crate::integrate::IntegrateError;
+use crate::provenance::Taken;
 use crate::recording::RecordingError;
 use crate::session::CameraIdentity;
 use crate::tally::Misfit;
+use nirspi_recon::law::{self, Doubt, Reading};
+use nirspi_recon::words::count_of;
 use nirspi_recon::{
-    Dropout, Image, MeasurementError, Measurements, Order, Rows, ShorterSweep, reconstruct,
+    Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, Side,
+    reconstruct,
 };
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -271,6 +278,8 @@ pub struct Source {
     pub imaginary: Option<Measurements>,
     /// Lost readings, with the rows that they affect.
     pub dropouts: Vec<Dropout>,
+    /// Single readings that light cannot have given. Their patterns are left out.
+    pub outliers: Vec<Outlier>,
     /// Positions in the order shown of the patterns that the file marks as not read: NaN, or a
     /// negative row.
     pub not_read: Vec<usize>,
@@ -278,8 +287,10 @@ pub struct Source {
     pub reference: Option<Image>,
     /// The account of a recording's frames.
     pub frames: Option<LossCounters>,
-    /// Whether no real light was measured; `None` if that is not known.
-    pub simulated: Option<bool>,
+    /// Where the readings come from.
+    pub taken: Taken,
+    /// What contradicts the readings, one line each: the image may not be of the scene.
+    pub warnings: Vec<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
     /// The flat field of the recorded camera, if one is kept.
@@ -290,10 +301,7 @@ impl Source {
     /// Corrects a reconstructed image by the flat field, if there is one.
     #[must_use]
     pub fn flattened(&self, image: Image) -> Image {
-        match &self.flat_field {
-            Some(flat) => flat.correct(&image),
-            None => image,
-        }
+        FlatField::corrected(self.flat_field.as_ref(), image)
     }
 
     /// The same measurements with the flat field of their camera.
@@ -349,23 +357,31 @@ impl Source {
     /// # Errors
     /// [`IntegrateError`] if its frames give no measurements.
     pub fn of_capture(capture: &Capture) -> Result<Self, IntegrateError> {
-        let Capture { setup, settling, integrated, counters, .. } = capture;
+        let Capture { camera, setup, settling, integrated, counters, .. } = capture;
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
         notes.extend(capture.missing().as_deref().map(not_whole));
         notes.extend(first_of(1 + capture.further.len()));
+        let read = of_frames(integrated.measurements(setup, settling.as_ref(), false)?)?;
         Ok(Self {
-            measurements: integrated.measurements(setup, settling.as_ref(), false)?,
+            measurements: read.measurements,
             imaginary: None,
             dropouts: Vec::new(),
+            outliers: read.outliers,
             not_read: Vec::new(),
             reference: None,
             frames: Some(*counters),
-            simulated: None,
+            taken: Taken::by(camera),
+            warnings: read.doubts.iter().map(Doubt::to_string).collect(),
             notes,
             flat_field: None,
         })
     }
+}
+
+/// The measurements of frames, whose signed values the law of readings holds for.
+fn of_frames(measurements: Measurements) -> Result<Reading, MeasurementError> {
+    law::read(measurements.rows(), measurements.values(), Form::Differences.into())
 }
 
 /// A note that a camera has further detectors.
@@ -385,6 +401,42 @@ fn not_whole(missing: &str) -> String {
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
 
 impl SourceOptions {
+    /// The options as data, for keys: each option by its name (`key::the_key_of_options_is_frozen`).
+    #[must_use]
+    pub fn key(&self) -> Value {
+        let Self { index, detector, file, part, keep_leak, no_flat_field } = self;
+        // The index of a file is that of these options.
+        let Selection {
+            index: _,
+            form,
+            field,
+            patterns_first,
+            side,
+            shown,
+            transpose,
+            decimal_comma,
+        } = file;
+        let of_index = |index: &Option<Index>| match index {
+            None => Value::Null,
+            Some(Index::One(index)) => (*index).into(),
+            Some(Index::All) => "all".into(),
+        };
+        json!({
+            "index": of_index(index),
+            "detector": of_index(detector),
+            "form": form.map(Form::name),
+            "field": field,
+            "patterns_first": patterns_first,
+            "side": side.map(Side::pixels),
+            "shown": shown.as_ref().map(Order::to_string),
+            "transpose": transpose,
+            "decimal_comma": decimal_comma,
+            "part": part.name(),
+            "keep_leak": keep_leak,
+            "no_flat_field": no_flat_field,
+        })
+    }
+
     /// The requested index.
     ///
     /// # Errors
@@ -437,56 +489,103 @@ impl SourceOptions {
 }
 
 fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, SourceError> {
-    let mut notes = file.notes;
-    let mut read = |readings: &Readings| {
-        measured(&file.h_row, readings, &mut notes)
-            .map_err(|problem| SourceError::Measurements { path: path.to_owned(), problem })
-    };
-    let (measurements, imaginary, mut dropouts) = match (&file.imaginary, part) {
-        (None, _) | (_, Part::Real) => {
-            let (measurements, dropouts) = read(&file.readings)?;
-            (measurements, None, dropouts)
+    let mut notes = file.notes.clone();
+    let wrong = |problem| SourceError::Measurements { path: path.to_owned(), problem };
+    // The law of readings is that of light, and light has no phase.
+    let plain = |readings: &Readings| as_they_are(&file.h_row, readings).map_err(wrong);
+    let (read, imaginary) = match (&file.imaginary, part) {
+        (None, _) => {
+            let y = file.readings.values();
+            (law::read(&file.h_row, y, file.claim).map_err(wrong)?, None)
         }
-        (Some(imaginary), Part::Imaginary) => {
-            let (measurements, dropouts) = read(imaginary)?;
-            (measurements, None, dropouts)
-        }
+        (Some(_), Part::Real) => (plain(&file.readings)?, None),
+        (Some(imaginary), Part::Imaginary) => (plain(imaginary)?, None),
         (Some(imaginary), Part::Magnitude) => {
-            // Both parts keep the same rows: detecting drop-outs by dimmed light does not apply to
-            // one part alone.
-            let differences = |readings| without_dropouts(&file.h_row, readings);
-            let wrong = |problem| SourceError::Measurements { path: path.to_owned(), problem };
-            let real = differences(&file.readings).map_err(wrong)?;
-            (real, Some(differences(imaginary).map_err(wrong)?), Vec::new())
+            (plain(&file.readings)?, Some(plain(imaginary)?.measurements))
         }
     };
-    for dropout in &mut dropouts {
-        // Readings are numbered as in the file, including those that were not read.
-        let place = |reading: usize| 2 * file.places[reading / 2] + reading % 2;
-        let last = dropout.start + dropout.length - 1;
-        (dropout.start, dropout.length) =
-            (place(dropout.start), place(last) + 1 - place(dropout.start));
+    if let Some(level) = read.dark_level {
+        notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
     }
+    // Readings are numbered as in the file, including those that were not read.
+    let outliers: Vec<Outlier> = read
+        .outliers
+        .iter()
+        .map(|outlier| Outlier { reading: file.place(outlier.reading), ..*outlier })
+        .collect();
+    let mut dropouts = read.dropouts;
+    for dropout in &mut dropouts {
+        let last = file.place(dropout.start + dropout.length - 1);
+        dropout.start = file.place(dropout.start);
+        if file.claim.form == Form::Pairs {
+            dropout.length = last + 1 - dropout.start;
+        }
+    }
+    let mut warnings: Vec<String> = read.doubts.iter().map(Doubt::to_string).collect();
+    warnings.extend(overload_words(&file.overloads));
+    let complex = file.imaginary.is_some();
     let reference = file.reference.map(|Reference { real, imaginary }| {
-        match (imaginary, imaginary_of(part, file.imaginary.is_some())) {
+        match (imaginary, imaginary_of(part, complex)) {
             (Some(imaginary), Part::Magnitude) => Image::magnitude(&real, &imaginary),
             (Some(imaginary), Part::Imaginary) => imaginary,
             (_, _) => real,
         }
     });
     let not_read = file.not_read;
-    let (frames, simulated, flat_field) = (None, file.simulated, None);
+    let taken = Taken::of_file(path, file.simulated);
+    let (frames, flat_field) = (None, None);
     Ok(Source {
-        measurements,
+        measurements: read.measurements,
         imaginary,
         dropouts,
+        outliers,
         not_read,
         reference,
         frames,
-        simulated,
+        taken,
+        warnings,
         notes,
         flat_field,
     })
+}
+
+/// A warning about readings that are an instrument's word for overload.
+#[must_use]
+pub fn overload_words(readings: &[usize]) -> Option<String> {
+    let first = readings.first()?;
+    let are = if readings.len() == 1 { "is" } else { "are" };
+    Some(format!(
+        "overload: {} {are} 9.9e37, an instrument's word for overload, from y[{first}] on; the patterns are left out",
+        count_of(readings.len(), "reading")
+    ))
+}
+
+/// A reading that light cannot have given, for a report.
+#[derive(Debug, Clone, Serialize)]
+pub struct OutlierReport {
+    /// The place of the reading in the file, or of the pattern in a recording.
+    pub reading: usize,
+    /// The reading.
+    pub value: f64,
+    /// The row of its pattern, which is left out.
+    pub row: u32,
+    /// What is impossible, in words.
+    pub why: String,
+}
+
+impl OutlierReport {
+    /// The report of an outlier.
+    #[must_use]
+    pub fn of(outlier: &Outlier) -> Self {
+        let Outlier { reading, value, row, .. } = *outlier;
+        Self { reading, value, row, why: outlier.to_string() }
+    }
+}
+
+impl fmt::Display for OutlierReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "outlier: reading [{}], {}; its pattern is left out", self.reading, self.why)
+    }
 }
 
 /// The part of a complex reference to compare with; for real readings, the real part.
@@ -494,34 +593,52 @@ fn imaginary_of(part: Part, complex: bool) -> Part {
     if complex { part } else { Part::Real }
 }
 
-/// The measurements of these readings, without drop-outs.
-fn measured(
-    rows: &Rows,
-    readings: &Readings,
-    notes: &mut Vec<String>,
-) -> Result<(Measurements, Vec<Dropout>), MeasurementError> {
-    match readings {
-        Readings::Pairs(y) => Measurements::from_pairs(rows, y),
-        Readings::Differential(d) => Ok((Measurements::from_differential(rows, d)?, Vec::new())),
-        Readings::Single(y) => {
-            let mut measurements = Measurements::from_single(rows, y)?;
-            if let Some(level) = measurements.remove_dark_level() {
-                notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
-            }
-            Ok((measurements, Vec::new()))
-        }
-    }
-}
-
-/// The measurements of all these readings.
-fn without_dropouts(rows: &Rows, readings: &Readings) -> Result<Measurements, MeasurementError> {
-    match readings {
+/// The measurements of all these readings, whether or not light can have given them.
+fn as_they_are(rows: &Rows, readings: &Readings) -> Result<Reading, MeasurementError> {
+    let mut dark_level = None;
+    let measurements = match readings {
         Readings::Pairs(y) => {
             let differences: Vec<f64> = y.as_chunks::<2>().0.iter().map(|[p, m]| p - m).collect();
-            Measurements::from_differential(rows, &differences)
+            Measurements::from_differential(rows, &differences)?
         }
-        Readings::Differential(d) => Measurements::from_differential(rows, d),
-        Readings::Single(y) => Measurements::from_single(rows, y),
+        Readings::Differential(d) => Measurements::from_differential(rows, d)?,
+        Readings::Single(y) => {
+            let mut measurements = Measurements::from_single(rows, y)?;
+            dark_level = measurements.remove_dark_level();
+            measurements
+        }
+    };
+    let (dropouts, outliers, doubts) = (Vec::new(), Vec::new(), Vec::new());
+    Ok(Reading { measurements, dropouts, outliers, doubts, dark_level })
+}
+
+#[cfg(test)]
+mod key {
+    use super::*;
+
+    #[test]
+    fn the_key_of_options_is_frozen() {
+        let options = SourceOptions {
+            index: Some(Index::All),
+            file: Selection { form: Some(Form::Halves), ..Selection::default() },
+            part: Part::Real,
+            ..SourceOptions::default()
+        };
+        let frozen = json!({
+            "index": "all",
+            "detector": null,
+            "form": "halves",
+            "field": null,
+            "patterns_first": false,
+            "side": null,
+            "shown": null,
+            "transpose": false,
+            "decimal_comma": false,
+            "part": "real",
+            "keep_leak": false,
+            "no_flat_field": false,
+        });
+        assert_eq!(options.key(), frozen);
     }
 }
 

@@ -5,6 +5,7 @@
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::files::measurement::Selection;
 use nirspi::imaging::{Enhance, ImageContext, SPREAD_COPIES, White};
+use nirspi::provenance::Made;
 use nirspi::recording::Recording;
 use nirspi::source::{Source, SourceOptions};
 use nirspi_nets::Device;
@@ -12,6 +13,10 @@ use nirspi_recon::reconstruct::{Method, MethodSettings};
 use nirspi_recon::{Order, Side};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+
+fn made() -> Made {
+    Made::by("nirspi 0.1.0", None, ["nirspi", "export", "rec.mcap"], 1_764_059_400)
+}
 
 fn recording() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/recordings/v1.mcap")
@@ -26,7 +31,7 @@ fn image_bits(source: &Source) -> Vec<u32> {
 fn exported(format: Format, options: &ExportOptions) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join(format!("rec.{}", format.name()));
-    let exported = export(&recording(), &out, format, options).unwrap();
+    let exported = export(&recording(), &out, format, options, &made()).unwrap();
     assert_eq!((exported.frames, exported.patterns), (12, 256));
     assert_eq!(exported.bytes, std::fs::metadata(&out).unwrap().len());
     (folder, out)
@@ -86,7 +91,7 @@ fn a_zarr_store_has_the_numbers_of_the_recording_in_the_order_of_its_description
     let options = ExportOptions::default();
     // The second time replaces the first.
     for _ in 0..2 {
-        let exported = export(&recording(), &out, Format::Zarr, &options).unwrap();
+        let exported = export(&recording(), &out, Format::Zarr, &options, &made()).unwrap();
         assert_eq!((exported.frames, exported.patterns), (12, 256));
         assert!(exported.bytes > 12 * 256 * 8, "{}", exported.bytes);
     }
@@ -161,9 +166,9 @@ fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
     assert!(spread.iter().all(|&spread| (0.0..0.5).contains(&spread)), "a standard deviation");
     assert!(spread.iter().any(|&spread| spread > 0.0));
     assert_eq!(images(&out, "/spread", 64), [spread]);
-    let half_width = made.half_width.unwrap();
-    assert!(half_width.iter().all(|&width| (0.0..1.0).contains(&width)), "of white");
-    assert_eq!(images(&out, "/interval", 64), [half_width]);
+    // Nothing is known of the noise of this recording's readings, so there is no interval.
+    assert!(made.half_width.is_none() && images(&out, "/interval", 64).is_empty());
+    assert!(made.no_interval.unwrap().contains("the noise of the readings"));
 }
 
 #[test]
@@ -178,7 +183,8 @@ fn nothing_is_left_of_an_export_that_fails() {
         (cut.clone(), "cut.mcap", "the file to write is the recording itself"),
     ] {
         let out = folder.path().join(out);
-        let error = export(&input, &out, Format::Npz, &ExportOptions::default()).unwrap_err();
+        let error =
+            export(&input, &out, Format::Npz, &ExportOptions::default(), &made()).unwrap_err();
         let line = nirspi::causes::in_one_line(&error);
         assert!(line.contains(told), "{line}");
     }

@@ -14,7 +14,8 @@ fn v1() -> PathBuf {
 fn the_dataset_has_the_cameras_time_and_the_computers_of_each_frame() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("rec.parquet");
-    export(&v1(), &out, Format::Parquet, &ExportOptions::default()).unwrap();
+    let made = nirspi::provenance::Made::by("test", None, ["test"], 0);
+    export(&v1(), &out, Format::Parquet, &ExportOptions::default(), &made).unwrap();
     let (mut device_us, mut host_ns) = (Vec::new(), Vec::new());
     hear_recording(&mut Recording::open(&v1()).unwrap(), |heard, _| {
         if let Some(frame) = heard.frame() {

@@ -6,7 +6,7 @@
 use nirspi::calibration::{
     FlatFieldError, Measured, Settling, Sweeps, measure_flat_field, pattern_noise,
 };
-use nirspi::imaging::compare;
+use nirspi::imaging::score;
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
 use nirspi::virtual_camera::{
@@ -66,7 +66,7 @@ fn a_flat_field_takes_the_pattern_of_unequal_leds_away() {
     let truth = optics.focused_footprint().unwrap().weights().to_vec();
     for (sampling, gained_db) in [(1.0, 4.0), (0.5, 0.2)] {
         let seen = image(&optics, &settling, sampling, 7);
-        let psnr = |image: &Image| compare(image, &truth).unwrap().quality.psnr_db;
+        let psnr = |image: &Image| score(image, &truth).unwrap().psnr_db.unwrap();
         let (before, after) = (psnr(&seen), psnr(&flat.correct(&seen)));
         println!("a letter, sampling {sampling}: {before:.2} dB before, {after:.2} after");
         assert!(after > before + gained_db, "{sampling}: {before} {after}");

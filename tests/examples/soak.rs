@@ -10,6 +10,7 @@
 
 use nirspi::capture::{Calibration, CaptureOptions, Ended, capture};
 use nirspi::picture::{Axis, Chart, Line};
+use nirspi::provenance::{Made, Origin, Taken};
 use nirspi::recording::Target;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
@@ -219,7 +220,9 @@ fn main() -> Result<(), Failure> {
     if points.is_empty() {
         println!("skipped: memory, this system does not say it");
     } else {
-        let picture = nirspi::files::image::encode_rgb(&chart(&points).render());
+        let made = Made::now("soak", None, std::env::args());
+        let provenance = Taken::without_camera(Origin::Simulated).made(&made);
+        let picture = nirspi::picture::signed_png(&chart(&points).render(), &provenance);
         std::fs::write(folder.join("memory.png"), picture)?;
     }
     Ok(())

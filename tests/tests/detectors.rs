@@ -267,7 +267,7 @@ fn a_recording_its_replay_and_its_arrays_keep_every_detector() {
         assert_eq!(one.measurements.values(), values);
     }
 
-    export(&path, &out, Format::Npz, &ExportOptions::default()).unwrap();
+    export(&path, &out, Format::Npz, &ExportOptions::default(), &made()).unwrap();
     let exported = Source::read_all(&out, &SourceOptions::default()).unwrap();
     assert_eq!(values(exported), each, "d is (detectors, patterns)");
     // frames is (frames, detectors, patterns); readings of a frame that was lost are NaN, so it has no reading.
@@ -288,7 +288,7 @@ fn a_recording_its_replay_and_its_arrays_keep_every_detector() {
     }
     let second = ExportOptions { detector: Some(1), ..ExportOptions::default() };
     let out = folder.path().join("second.npz");
-    export(&path, &out, Format::Npz, &second).unwrap();
+    export(&path, &out, Format::Npz, &second, &made()).unwrap();
     let exported = Source::read(&out, &SourceOptions::default()).unwrap();
     assert_eq!(exported.measurements.values(), each[1]);
 }
@@ -312,7 +312,7 @@ fn a_choice_of_detectors_that_does_not_fit_is_one_line() {
     let frames = SourceOptions { index: Some(Index::All), ..of_detector(Index::One(2)) };
     assert_eq!(Source::read_all(&path, &frames).unwrap().len(), FRAMES as usize);
     let npz = folder.path().join("three.npz");
-    export(&path, &npz, Format::Npz, &ExportOptions::default()).unwrap();
+    export(&path, &npz, Format::Npz, &ExportOptions::default(), &made()).unwrap();
     let error = Source::read(&npz, &of_detector(Index::One(1))).unwrap_err().to_string();
     assert!(error.starts_with("--detector belongs to recordings"), "{error}");
 }
@@ -341,7 +341,7 @@ fn an_archive_has_a_row_of_each_detector() {
     // Of detector 2, frame 1 is lost.
     let judge = only_frames(|frame| if frame == 5 { Fate::Drop } else { Fate::Pass });
     run(Box::new(Tampered::new(link(&three()), judge)), Some(&recording));
-    export(&recording, &arrays, Format::Npz, &ExportOptions::default()).unwrap();
+    export(&recording, &arrays, Format::Npz, &ExportOptions::default(), &made()).unwrap();
 
     let of_recording = reader(of_detector(Index::All)).rows(&recording, "three.mcap").unwrap();
     let of_arrays = reader(SourceOptions::default()).rows(&arrays, "three.npz").unwrap();
@@ -381,4 +381,8 @@ fn an_archive_has_a_row_of_each_detector() {
     let [skipped] = &report.skipped[..] else { panic!("{:?}", report.skipped) };
     assert_eq!(skipped.file, "three.npz");
     assert!(skipped.reason.contains("--detector belongs to recordings"), "{}", skipped.reason);
+}
+
+fn made() -> nirspi::provenance::Made {
+    nirspi::provenance::Made::by("test", None, ["test"], 0)
 }

@@ -1,16 +1,18 @@
 //! `nirspi calibrate`: measures ADC latency, settling and flat field against a white sheet and
 //! keeps them for the camera.
 
+use super::Usage;
 use super::address;
-use super::camera::{CameraArgs, ModelArgs, SceneArgs};
-use super::print;
+use super::camera::{CameraArgs, ModelArgs, SceneArgs, exposure};
 use super::progress::Progress;
 use super::report::ReportArgs;
+use super::{print, provenance};
 use anyhow::{Context, Result, anyhow};
 use nirspi::calibration::{
     KeptCalibration, KeptFlatField, Settling, Sweeps, calibrate, flat_field_path_of, measure_dark,
     measure_flat_field, path_of,
 };
+use nirspi::exposure::{Length, Light};
 use nirspi::session::{IgnorePackets, Session};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
@@ -50,6 +52,14 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 8000,
           value_parser = clap::value_parser!(u32).range(8..=10_000_000))]
     sweeps: u32,
+    #[arg(
+        long,
+        value_name = "TIME",
+        conflicts_with = "sweeps",
+        allow_hyphen_values = true,
+        help = "Light of the flat field or the dark frame, as a time with its unit, in place of --sweeps: 0.7s"
+    )]
+    light: Option<Light>,
     #[command(flatten)]
     model: ModelArgs,
     /// Seed of the virtual camera's simulated noise
@@ -112,7 +122,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let summary = flat_field.as_ref().map(|(flat, _)| flat.summary());
     let flat_field = flat_field.map(|(flat, file)| FlatFieldReport::new(&flat, file));
     let report = Report { kept, file, flat_field };
-    args.report.print(&report, |report| say(report, summary))
+    let provenance = provenance::of_camera(&report.kept.camera);
+    args.report.print(&report, &provenance, |report| say(report, summary))
 }
 
 fn say(report: &Report, flat_field: Option<impl std::fmt::Display>) -> Result<()> {
@@ -141,13 +152,24 @@ fn setup(args: &Args, settling: &Settling) -> Result<MeasurementSetup> {
     Ok(MeasurementSetup { adc_latency: settling.adc_latency, ..setup })
 }
 
+/// The number of sweeps to sum: --sweeps, or those that --light takes.
+fn sweeps(args: &Args, setup: &MeasurementSetup) -> Result<u32> {
+    let Some(light) = args.light else { return Ok(args.sweeps) };
+    let sweeps = exposure(Length::Light(light, Some(1)), setup)?.frames;
+    if (8..=10_000_000).contains(&sweeps) {
+        return Ok(sweeps);
+    }
+    Err(Usage(format!("--light {light} is {sweeps} sweeps, expected 8 to 10000000")).into())
+}
+
 /// Measures the flat field and writes its file.
 fn white(
     args: &Args,
     session: &mut Session,
     settling: &Settling,
 ) -> Result<(KeptFlatField, PathBuf)> {
-    let (setup, sweeps) = (setup(args, settling)?, Sweeps::of_map(args.sweeps));
+    let setup = setup(args, settling)?;
+    let sweeps = Sweeps::of_map(sweeps(args, &setup)?);
     let bar = Progress::of("flat field", sweeps.map + 2 * sweeps.check, "sweeps");
     let measured = measure_flat_field(session, &setup, settling, sweeps, &mut bar.watch());
     drop(bar);
@@ -170,15 +192,16 @@ fn run_dark(args: &Args) -> Result<ExitCode> {
     })?;
     let settling = KeptCalibration::read(&path_of(&camera.serial)?, &camera)?.settling;
     let setup = setup(args, &settling)?;
-    let bar = Progress::of("dark frame", 2 * u64::from(args.sweeps), "sweeps");
-    let (flat, sweeps) = (kept.flat.clone(), args.sweeps);
+    let (flat, sweeps) = (kept.flat.clone(), sweeps(args, &setup)?);
+    let bar = Progress::of("dark frame", 2 * u64::from(sweeps), "sweeps");
     let flat = measure_dark(&mut session, &setup, &settling, flat, sweeps, &mut bar.watch());
     drop(bar);
     let kept =
         kept.renewed(flat.with_context(|| format!("{}: no dark frame", args.camera.camera))?);
     let file = flat_field_path_of(&camera.serial)?;
     kept.write(&file)?;
-    args.report.print(&FlatFieldReport::new(&kept, file), |dark| {
+    let provenance = provenance::of_camera(&camera);
+    args.report.print(&FlatFieldReport::new(&kept, file), &provenance, |dark| {
         print::line(format_args!(
             "dark frame: {} of 1024 pixels read something without light, beyond noise; kept in {}",
             dark.dark_pixels.unwrap_or(0),

@@ -4,6 +4,7 @@ use super::Usage;
 use super::address::CameraAddress;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
@@ -172,14 +173,14 @@ impl SceneArgs {
 pub struct SetupArgs {
     #[arg(long, value_name = "ORDER", default_value = "cake-cutting", help = order_help())]
     pub order: String,
-    /// Share of all patterns to show, the first of the order: 0.3, 30% or 30 [default: 0.5; 1 for capture, because a
-    /// recording can be reconstructed from fewer patterns later]
+    /// Share of all patterns to show, the first of the order: 0.3 or 30% [default: 0.5; 1 for capture, because a recording
+    /// can be reconstructed from fewer patterns later]
     #[arg(long, value_name = "SHARE")]
     pub sampling: Option<Sampling>,
-    /// Sweeps summed into one frame
-    #[arg(long, value_name = "N", default_value_t = 1,
-          value_parser = clap::value_parser!(u32).range(1..))]
-    pub sweeps: u32,
+    /// Sweeps summed into one frame [default: so many that a frame takes about as long as one sweep of all patterns; with --light,
+    /// so many that the boards' link carries every frame]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub sweeps: Option<u32>,
     /// ADC clocks (of 8 ns) for which each pattern is shown: 5 is 25 MHz [default: what the camera description says; 5 for
     /// the paper's camera]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -209,11 +210,25 @@ impl SetupArgs {
         let sampling = self.sampling.unwrap_or(default_sampling);
         let mut setup = MeasurementSetup::new(&order, sampling.share())
             .with_context(|| format!("--order {}", self.order))?;
-        setup.sweeps = self.sweeps;
         setup = setup.timed(clocks, blanked);
         setup.differential = !self.non_differential;
+        setup.sweeps = self.sweeps.unwrap_or_else(|| setup.sweeps_as_long_as_all());
         Ok(setup)
     }
+
+    /// The frames and sweeps that make up this light.
+    pub fn exposure(&self, light: Light, setup: &MeasurementSetup) -> Result<Exposure> {
+        exposure(Length::Light(light, self.sweeps), setup)
+    }
+}
+
+/// Help of `--light`.
+pub const LIGHT_HELP: &str = "Light of the measurement, as a time with its unit: 20ms, 0.5s. The frames and the sweeps of a frame follow from \
+                              it, so that another share of the patterns gets the same light";
+
+/// The frames and sweeps of a measurement.
+pub fn exposure(length: Length, setup: &MeasurementSetup) -> Result<Exposure> {
+    Exposure::of(length, setup).map_err(|error| Usage(format!("--light: {error}")).into())
 }
 
 fn order_help() -> String {

@@ -35,7 +35,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let report = camera_model(&camera)?;
-    args.report.print(&report, say)
+    args.report.print_answer(&report, say)
 }
 
 /// The shipped file of this name, if the file is complete. Other shipped files have only the
@@ -72,7 +72,8 @@ fn say(report: &Report) -> Result<()> {
     if let Some(refused) = &report.eye_safety_refused {
         return print::line(format_args!("eyes: refused: {refused}"));
     }
-    report.eye_safety.iter().try_for_each(|light| {
-        print::line(format_args!("eyes: {light} (more: nirspi safety)"))
-    })
+    report
+        .eye_safety
+        .iter()
+        .try_for_each(|light| print::line(format_args!("eyes: {light} (more: nirspi safety)")))
 }

@@ -1,12 +1,14 @@
 //! `nirspi capture`: records a camera, with an account of every frame.
 
 use super::calibration::CalibrationArgs;
-use super::camera::{CameraArgs, SceneArgs, SetupArgs};
+use super::camera::{CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
 use super::report::ReportArgs;
-use super::{Usage, address, print, progress, stop_on_signal};
+use super::{Usage, address, print, progress, provenance, stop_on_signal};
 use anyhow::Result;
 use nirspi::calibration::Origin;
 use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, observe};
+use nirspi::exposure::Light;
+use nirspi::link::CameraAddress;
 use nirspi::picture::half_blocks;
 use nirspi::recording::Target;
 use nirspi_recon::words::count;
@@ -35,6 +37,8 @@ pub struct Args {
     /// Frames to measure [default: until Ctrl-C]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
+    #[arg(long, value_name = "TIME", conflicts_with = "frames", allow_hyphen_values = true, help = LIGHT_HELP)]
+    light: Option<Light>,
     #[command(flatten)]
     setup: SetupArgs,
     #[command(flatten)]
@@ -62,17 +66,26 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut setup = args.setup.setup(Sampling::ALL, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
+    let mut frames = args.frames;
+    if let Some(light) = args.light {
+        if matches!(args.camera.camera, CameraAddress::Replay(_)) {
+            let why = "a recording has its own frames, use --frames";
+            return Err(Usage(format!("--light with --camera replay: {why}")).into());
+        }
+        let exposure = args.setup.exposure(light, &setup)?;
+        (frames, setup.sweeps) = (Some(exposure.frames), exposure.sweeps);
+    }
     let target = target(args)?;
     let stop = stop_on_signal()?;
     let mut session = address::open(&args.camera.camera, &args.scene)?;
     let choice = args.calibration.choose(&setup, session.identity())?;
     let options = CaptureOptions {
         setup,
-        frames: args.frames,
+        frames,
         calibration: choice.calibration.clone(),
         record: Some(target),
     };
-    let bar = progress::Progress::new("capture", args.frames.map(u64::from), "frames");
+    let bar = progress::Progress::new("capture", frames.map(u64::from), "frames");
     let mut seen = String::new();
     let watch = |progress: &Progress, image: Option<Image>| {
         if let (Some(image), Some(tones)) = (image, bar.tones()) {
@@ -131,7 +144,7 @@ fn target(args: &Args) -> Result<Target> {
 
 fn say(args: &Args, report: &CaptureReport<'_>) -> Result<ExitCode> {
     let (frames, path) = (report.frames, report.recording.display());
-    args.report.print(report, |report| {
+    args.report.print(report, &provenance::of_camera(report.camera), |report| {
         if let Some(note) = report.calibration_note {
             print::note(note)?;
         }

@@ -1,12 +1,13 @@
 //! `nirspi dataset`: a set of measurements by the virtual camera, as one table with its data card.
 
-use super::camera::{ModelArgs, parse_order};
+use super::camera::{LIGHT_HELP, ModelArgs, parse_order};
 use super::method::MethodArgs;
 use super::reconstruct::FolderArgs;
 use super::report::ReportArgs;
-use super::{Usage, print};
+use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::archive::{Grid, GridAxes, write_file};
+use nirspi::exposure::{Length, Light};
 use nirspi::source::FirstPatterns;
 use nirspi_recon::Sampling;
 use std::path::PathBuf;
@@ -39,9 +40,11 @@ pub struct Args {
     /// Seeds of the simulated noise
     #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', default_value = "1")]
     seeds: Vec<u64>,
-    /// Frames summed into a measurement; 244 frames of all patterns take 20 ms
+    /// Frames summed into a measurement; 244 frames take 20 ms with any share of the patterns
     #[arg(long, value_name = "N", default_value_t = 244)]
     frames: u32,
+    #[arg(long, value_name = "TIME", conflicts_with = "frames", allow_hyphen_values = true, help = LIGHT_HELP)]
+    light: Option<Light>,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -65,7 +68,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         orders: orders.collect::<Result<_>>()?,
         samplings: args.samplings.clone(),
         seeds: args.seeds.clone(),
-        frames: args.frames,
+        length: args
+            .light
+            .map_or(Length::Frames(args.frames, None), |light| Length::Light(light, None)),
     };
     let options = args.folder.options(&args.out, "this set")?;
     let solver = args.method.solver(FirstPatterns::Recorded, Sampling::ALL)?;
@@ -76,7 +81,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             anyhow::Error::from(error)
         }
     })?;
-    let (report, code) = args.folder.run(&grid, &options, "measurements", args.report)?;
+    let (report, code) =
+        args.folder.run(&grid, &options, "measurements", args.report, &provenance::simulated())?;
     write_file(&args.out.with_extension("md"), grid.card(&report).as_bytes())?;
     if !args.report.json {
         let card = report.out.with_extension("md");

@@ -4,11 +4,13 @@ use super::Usage;
 use super::enhance::say;
 use super::networks::{ImageArgs, checked};
 use super::progress::Progress;
+use super::provenance::made;
 use super::report::stages;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nirspi::files::stack::ImageStack;
 use nirspi::imaging::{Deblurring, SPREAD_COPIES};
+use nirspi::provenance::Provenance;
 use nirspi_nets::classical;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Images, KnownEstimate, Method, Options, deblur};
@@ -121,9 +123,14 @@ impl Sharpening {
     }
 
     /// Writes the spread, if requested.
-    pub fn write_spread(&self, input: &ImageStack, spread: Option<&[f32]>) -> Result<()> {
+    pub fn write_spread(
+        &self,
+        input: &ImageStack,
+        spread: Option<&[f32]>,
+        provenance: &Provenance,
+    ) -> Result<()> {
         if let (Some(file), Some(spread)) = (&self.spread, spread) {
-            input.target(file)?.write(deblur::SIDE, spread)?;
+            input.target(file)?.write(deblur::SIDE, spread, provenance)?;
         }
         Ok(())
     }
@@ -149,6 +156,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let input = times.time("read", || args.images.read(deblur::SIDE))?;
     let images: Blurred<'_> = checked(&input)?;
     let target = input.target(&args.images.out)?;
+    let provenance = input.taken()?.made(made());
     let bar = Progress::of("deblurring", input.count(), "images");
     let (networks, result) = match way {
         Way::Network(method) => {
@@ -171,8 +179,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     };
     drop(bar);
-    args.sharpening.write_spread(&input, result.spread.as_deref())?;
-    let shown = target.write_and_show(deblur::SIDE, &result.images, "deblurred")?;
+    args.sharpening.write_spread(&input, result.spread.as_deref(), &provenance)?;
+    let shown = target.write_and_show(deblur::SIDE, &result.images, "deblurred", &provenance)?;
 
     let (steps, consistency) = match way {
         Way::Network(method) => (method.steps().get(), options.consistency),
@@ -180,5 +188,5 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let deblurring = Deblurring::of(way.name(), steps, consistency, options.seed, &result);
     let report = args.images.report(&input, &networks, Some(deblurring), shown, times);
-    args.images.report.print(&report, say)
+    args.images.report.print(&report, &provenance, say)
 }

@@ -1,46 +1,58 @@
 //! `nirspi demo`: the whole camera on a simulated scene, from light to picture.
 
-use super::camera::{SceneArgs, SetupArgs};
+use super::camera::{LIGHT_HELP, Rain, SceneArgs, SetupArgs, exposure};
 use super::method::{MethodArgs, Solved, solve};
 use super::print;
 use super::progress::Progress;
-use super::report::{ReportArgs, StageTimes, stages, to_json};
+use super::provenance;
+use super::report::{ReportArgs, StageTimes, stages};
 use anyhow::Result;
 use nirspi::account::LossCounters;
+use nirspi::exposure::{Length, Light};
 use nirspi::files::image::encode_grey;
 use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi::imaging::{Fitted, MethodReport, Quality, compare};
+use nirspi::imaging::{KnownReadings, MethodReport, Quality, score, share_of_white};
 use nirspi::picture::Pictures;
-use nirspi::scene::SceneMap;
 use nirspi::session::CameraIdentity;
+use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{
-    Panels, Stages, StagesReport, calibrate_against_white, enhance_stages,
-    flat_field_against_white, shoot,
+    CameraModel, Panels, SCENE_PX, Stages, StagesReport, calibrate_against_white, enhance_stages,
+    flat_field_against_white, shoot, white_level_at_target,
 };
 use nirspi_recon::words::{count, count_of};
-use nirspi_recon::{Measurements, Sampling, reconstruct};
+use nirspi_recon::{Image, Measurements, Sampling, reconstruct};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Show what the camera does, without a camera: capture a simulated scene and reconstruct it
+/// Show what the camera does, without a camera: the paper's chain on a simulated scene
 ///
-/// The light is simulated; the gateware is its bit-exact model; firmware logic and wire protocol are those of a real camera.
-/// The program calibrates the virtual camera against a white sheet, captures the scene, reconstructs the image, fuses the
-/// image with depth and deblurs it. The command writes the scene and the image of every stage as PNG and NPY,
-/// side_by_side.png, report.json, and measurement.npz and frames.npy to try other commands on.
+/// The chain of the paper: heavy rain between camera and scene, half of the patterns, OMP, fusion with depth, deblurring by a
+/// diffusion network; the plain inverse transform stands beside the result. The light is simulated; the gateware is its
+/// bit-exact model; firmware logic and wire protocol are those of a real camera. The program calibrates the virtual camera
+/// against a white sheet, and measures a white sheet in place of the scene: every image is in shares of that white, as it is,
+/// with its noise. Scores compare an image with the scene after a fit of gain and offset, which stands beside them; no image
+/// is fitted. The command writes the scene and the image of every stage as PNG and NPY, side_by_side.png, report.json, and
+/// measurement.npz and frames.npy to try other commands on.
+///
+/// A capture that loses frames ends with exit code 1, and nothing is written.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n\
-    \x20 nirspi demo --scene letter:R --out demo/")]
+#[command(mut_arg("method", |method| method.default_value("omp")))]
+#[command(mut_arg("rain", |rain| rain.help(RAIN_HELP).long_help(RAIN_HELP)))]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi demo --scene letter:R --out demo/\n\
+    \x20 nirspi demo --scene word:STOP --rain none --method tv --sampling 25% --light 50ms --out stop/")]
 pub struct Args {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Frames to measure; the image is made from their sum [default: what the camera description says; 244 for the paper's
-    /// camera]
+    /// Frames to measure, in place of --light; the image is made from their sum
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
+    #[arg(long, value_name = "TIME", conflicts_with = "frames", allow_hyphen_values = true,
+          help = format!("{LIGHT_HELP} [default: what the camera description says; 20ms for the paper's camera]"))]
+    light: Option<Light>,
     #[command(flatten)]
     setup: SetupArgs,
     #[command(flatten)]
@@ -50,6 +62,35 @@ pub struct Args {
     out: PathBuf,
     #[command(flatten)]
     report: ReportArgs,
+}
+
+const RAIN_HELP: &str = "Rain between the virtual camera and the target, as in the paper's Table 2: light is 1.93 mm/h of \
+                         0.5 mm drops, heavy 5.6 mm/h of 2 mm drops [default: what the camera description says; heavy if it \
+                         says dry air]";
+
+impl Args {
+    /// The scene in the paper's weather, unless the user or the camera description says another.
+    fn scene(&self, model: &CameraModel) -> SceneArgs {
+        let said = self.scene.rain.is_some() || self.scene.weather.weather.is_some();
+        let rain = match said || !model.weather.air.is_clear() {
+            true => self.scene.rain,
+            false => Some(Rain::Heavy),
+        };
+        SceneArgs { rain, ..self.scene.clone() }
+    }
+
+    /// How long to measure.
+    fn length(&self, model: &CameraModel) -> Result<Length> {
+        let readout = model.readout;
+        Ok(match (self.light, self.frames) {
+            (_, Some(frames)) => Length::Frames(frames, self.setup.sweeps),
+            (Some(light), None) => Length::Light(light, self.setup.sweeps),
+            (None, None) => {
+                let (sweeps, clocks) = (readout.sweeps_per_picture, readout.clocks_per_pattern);
+                Length::Light(Light::of_full_sweeps(sweeps, clocks)?, self.setup.sweeps)
+            }
+        })
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -72,14 +113,19 @@ struct Report<'a> {
     patterns: usize,
     order: String,
     differential: bool,
+    /// Sweeps summed into each frame.
+    sweeps: u32,
+    /// The time of light.
     acquisition_ms: f64,
+    /// ADC counts of a pixel that sees the white sheet: 1 in every image.
+    white_counts: f32,
     frames: LossCounters,
     adc_latency_clocks: u8,
     leak_taps: Vec<f64>,
     /// Row and column of dead LEDs found by the flat field; `null` if all LEDs are alike and no
     /// flat field was measured.
     dead_leds: Option<Vec<[u8; 2]>>,
-    /// Plain inverse transform, with the leak uncorrected.
+    /// Plain inverse transform of the same measurements.
     raw: Quality,
     /// The result, compared with the image of a perfect 32 x 32 camera.
     reconstruction: Quality,
@@ -95,63 +141,79 @@ struct Report<'a> {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
-    let setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
+    let described = args.scene.model.read()?;
+    let scene = args.scene(&described);
+    let setup = args.setup.setup(Sampling::HALF, &scene.model)?;
+    let exposure = exposure(args.length(&described)?, &setup)?;
+    let setup = MeasurementSetup { sweeps: exposure.sweeps, ..setup };
     let mut times = stages();
-    let (map, optics) = times.time("scene", || args.scene.optics())?;
+    let (map, optics) = times.time("scene", || scene.optics())?;
     // Latency belongs to the camera and not to the scene.
-    let seed = args.scene.seed;
+    let seed = scene.seed;
     let model = optics.camera_model();
-    let frames = args.frames.unwrap_or(model.readout.sweeps_per_picture);
     let settling = times.time("calibrate", || calibrate_against_white(&optics, seed))?;
     let flat_field =
         times.time("flat_field", || flat_field_against_white(&optics, &settling, seed))?;
+    let white = times.time("white_sheet", || {
+        white_level_at_target(&optics, &settling, flat_field.as_ref(), seed)
+    })?;
 
-    let bar = Progress::of("capture", frames, "frames");
-    let shot = times
-        .time("capture", || shoot(&optics, setup, &settling, frames, seed, &mut bar.watch()))?;
+    let bar = Progress::of("capture", exposure.frames, "frames");
+    let shot = times.time("capture", || {
+        shoot(&optics, setup, &settling, exposure.frames, seed, &mut bar.watch())
+    })?;
     drop(bar);
     let camera = shot.session.identity().clone();
     let captured = &shot.capture;
     let mut notes: Vec<String> =
         captured.integrated.warnings().into_iter().map(str::to_owned).collect();
     let setup = &captured.setup;
-    let settling = captured.settling.as_ref();
-    let leak = settling.map(|s| s.leak(setup.clocks_per_pattern, setup.blanked)).transpose()?;
-    let raw = captured.integrated.measurements(setup, settling, true)?;
-    let raw = times.time("inverse_transform", || reconstruct::hadamard(&raw));
+    let leak = captured.settling.as_ref().map(|s| s.leak(setup.clocks_per_pattern, setup.blanked));
+    let leak = leak.transpose()?;
     let measurements = shot.measurements()?;
+    // Every image is corrected for unequal LEDs, and in shares of the white sheet.
+    let seen = |image: Image| match &flat_field {
+        Some(flat) => share_of_white(&flat.correct(&image), white),
+        None => share_of_white(&image, white),
+    };
+    let raw = seen(times.time("inverse_transform", || reconstruct::hadamard(&measurements)));
     let Solved { image, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
-    let image = match &flat_field {
-        Some(flat) => flat.correct(&image),
-        None => image,
-    };
+    let image = seen(image);
 
     let truth = optics.focused_footprint()?.weights().to_vec();
-    let raw = compare(&raw, &truth)?;
-    let fitted = compare(&image, &truth)?;
-    let stages = enhance_stages(&image, measurements.rows(), &optics, seed, &mut times)?;
-    if fitted.quality.inverted {
+    let (raw_quality, quality) = (score(&raw, &truth)?, score(&image, &truth)?);
+    let settings = args.method.settings_for(measurements.side().pixels())?;
+    // In shares of the white sheet, as the image.
+    let noise = measurements.noise().map(|counts| counts / f64::from(white));
+    let readings = KnownReadings::new(args.method.method, &settings, &measurements, noise);
+    let rows = measurements.rows();
+    let stages = enhance_stages(&image, rows, readings, &optics, seed, &mut times)?;
+    if quality.inverted {
         notes.push(
             "the image is darker where the scene is brighter: it is scored as blank".to_owned(),
         );
     }
-    let acquisition_ms = setup.frame_ns() * f64::from(frames) * 1e-6;
-    let rain = args.scene.air(model)?.name().to_owned();
+    notes.extend(quality.no_psnr.map(|why| format!("no PSNR: {why}")));
+    let acquisition_ms = exposure.light_ms(setup);
+    let rain = scene.air(model)?.name().to_owned();
+    let in_field = optics.focused(SCENE_PX);
     let panels = Panels {
         map: &map,
+        in_field: &in_field,
         optics: &optics,
         capture: captured,
         acquisition_ms,
         rain: &rain,
         seed,
         truth: &truth,
-        raw: &raw,
-        result: &fitted,
+        raw: (&raw, &raw_quality),
+        result: (&image, &quality),
         method: &method,
         stages: &stages,
     };
-    let pictures = panels.pictures();
+    let provenance = provenance::of_camera(&camera);
+    let pictures = panels.pictures(&provenance);
     let report = Report {
         scene: map.name.clone(),
         simulated: true,
@@ -168,90 +230,98 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         patterns: setup.rows.len(),
         order: setup.order.clone(),
         differential: setup.differential,
+        sweeps: setup.sweeps,
         acquisition_ms,
+        white_counts: white,
         frames: captured.counters,
         adc_latency_clocks: setup.adc_latency,
         leak_taps: leak.map(|leak| leak.taps().to_vec()).unwrap_or_default(),
         dead_leds: flat_field.map(|flat| flat.dead_leds().to_vec()),
-        raw: raw.quality,
-        reconstruction: fitted.quality,
-        quality_note: "against the scene on the 32 x 32 LED grid without defocus, after the gain and offset of \
-                       least squares",
+        raw: raw_quality,
+        reconstruction: quality,
+        quality_note: "against the scene on the 32 x 32 LED grid without defocus; PSNR and SSIM after the gain and \
+                       offset of least squares, which stand under fit; the images are not fitted",
         enhancement: &stages.report,
         method,
         notes,
         pictures,
         stage_ms: times,
     };
-    let images = Images { map: &map, truth, raw, fitted, measurements, stages: &stages };
+    let images = Images { in_field, truth, raw, image, measurements, stages: &stages };
     write(args, &images, &report)?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
-/// The images of the report's stages.
+/// The images of the report's stages. Images of the camera are in shares of the white sheet.
 struct Images<'a> {
-    map: &'a SceneMap,
+    in_field: Vec<f32>,
     truth: Vec<f32>,
-    raw: Fitted,
-    fitted: Fitted,
+    raw: Image,
+    image: Image,
     measurements: Measurements,
     stages: &'a Stages,
 }
 
 fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
-    let (map, stages) = (images.map, images.stages);
+    let stages = images.stages;
     let side = images.measurements.rows().side().pixels();
     let grid = [side, side];
+    let provenance = report.pictures.provenance();
     let mut out = OutputDir::create(&args.out)?;
-    let scene = &map.reflectance;
-    out.write("scene.png", &encode_grey(map.size_px, map.size_px, scene))?;
-    out.write("scene.npy", &npy::encode(&[map.size_px, map.size_px], scene))?;
+    let scene = &images.in_field;
+    out.write("scene.png", &encode_grey(SCENE_PX, SCENE_PX, scene, provenance))?;
+    out.write("scene.npy", &npy::encode(&[SCENE_PX, SCENE_PX], scene))?;
     out.write("truth.npy", &npy::encode(&grid, &images.truth))?;
-    out.write("raw.npy", &npy::encode(&grid, &images.raw.values))?;
-    out.write("reconstruction.npy", &npy::encode(&grid, &images.fitted.values))?;
+    out.write("raw.npy", &npy::encode(&grid, images.raw.pixels()))?;
+    out.write("reconstruction.npy", &npy::encode(&grid, images.image.pixels()))?;
     // The input of `enhance` and `reconstruct`.
-    out.write("frames.npy", &npy::encode(&[1, side, side], &images.fitted.values))?;
+    out.write("frames.npy", &npy::encode(&[1, side, side], images.image.pixels()))?;
     let measurement = args.out.join("measurement.npz");
-    out.write("measurement.npz", &encode_measurement(&measurement, &images.measurements, true)?)?;
+    let measured = encode_measurement(&measurement, &images.measurements, provenance)?;
+    out.write("measurement.npz", &measured)?;
     out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &stages.truth))?;
-    for (name, image) in [
-        ("upscaled", &stages.upscaled),
-        ("fused", &stages.fused),
-        ("deblurred", &stages.deblurred),
-        ("interval", &stages.half_width),
-    ] {
+    for (name, image) in
+        [("upscaled", &stages.upscaled), ("fused", &stages.fused), ("deblurred", &stages.deblurred)]
+    {
         out.write(&format!("{name}.npy"), &npy::encode(&[2 * side, 2 * side], image))?;
     }
+    if let Some(half_width) = &stages.half_width {
+        out.write("interval.npy", &npy::encode(&[2 * side, 2 * side], half_width))?;
+    }
     report.pictures.write(&mut out)?;
-    out.write("report.json", to_json(report)?.as_bytes())?;
+    out.write("report.json", provenance.sign(report)?.as_bytes())?;
     out.commit()?;
     Ok(())
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!(
-        "{} at {} m, {} of {} in {:.1} ms of (simulated) light",
+        "{} at {} m, weather {}: {} of {} of {}, {:.1} ms of (simulated) light",
         report.scene,
         report.distance_m,
+        report.rain,
         count(report.frames.received, "frame"),
+        count(report.sweeps, "sweep"),
         count_of(report.patterns, "pattern"),
         report.acquisition_ms
     ))?;
     print::line(format_args!("frames: {}", report.frames))?;
-    print::line(format_args!("raw:    {}", quality_line(&report.raw)))?;
-    print::line(format_args!("result: {}", quality_line(&report.reconstruction)))?;
-    print::line(format_args!("{}", report.method))?;
+    print::line(grid_line(32, &report.reconstruction))?;
+    print::line(format_args!("  plain transform:     {}", report.raw))?;
+    print::line(format_args!("  result:              {}", report.reconstruction))?;
+    print::line(format_args!("  {}", report.method))?;
     let enhancement = &report.enhancement;
-    print::line(format_args!("at 64 x 64, Lanczos: {}", quality_line(&enhancement.upscaled)))?;
-    print::line(format_args!("enlarged by network: {}", quality_line(&enhancement.fused)))?;
+    print::line(grid_line(64, &enhancement.deblurred))?;
+    print::line(format_args!("  Lanczos:             {}", enhancement.upscaled))?;
+    print::line(format_args!("  enlarged by network: {}", enhancement.fused))?;
+    print::line(format_args!("  deblurred:           {}", enhancement.deblurred))?;
     print::line(format_args!(
-        "deblurred:           {} (blur {}, noise {:.4} estimated, inconsistency {:.2})",
-        quality_line(&enhancement.deblurred),
+        "  blur {}, noise {:.4} estimated, inconsistency {:.2}",
         enhancement.blur_line(),
         enhancement.noise,
         enhancement.inconsistency
     ))?;
-    print::line(enhancement.trust_line())?;
+    print::line(enhancement.uncertainty_line())?;
     for warning in &enhancement.warnings {
         print::line(format_args!("warning: {warning}"))?;
     }
@@ -259,6 +329,11 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     print::line(format_args!("look at {}", args.out.join("side_by_side.png").display()))
 }
 
-fn quality_line(quality: &Quality) -> String {
-    format!("PSNR {:.2} dB, SSIM {:.3}", quality.psnr_db, quality.ssim)
+/// What the scores below this line compare with.
+fn grid_line(side: usize, quality: &Quality) -> String {
+    let blank = quality
+        .blank_db()
+        .map(|blank_db| format!(", where a blank picture has {blank_db:.2} dB"))
+        .unwrap_or_default();
+    format!("against the scene on the {side} x {side} grid{blank}:")
 }

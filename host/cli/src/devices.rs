@@ -24,7 +24,7 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     let devices = list(&args.tcp);
-    args.report.print(&devices, |devices| {
+    args.report.print_answer(&devices, |devices| {
         let line = |device: &Device| print::line(format_args!("{:<28} {device}", device.camera));
         devices.iter().try_for_each(line)
     })?;

@@ -4,12 +4,15 @@ use super::deblur::{Sharpening, in_steps};
 use super::networks::{ImageArgs, checked};
 use super::print;
 use super::progress::Progress;
-use super::report::stages;
+use super::provenance::made;
+use super::report::{stages, words};
 use super::upscale::DepthArgs;
 use anyhow::Result;
 use nirspi::imaging::{Deblurring, StackReport};
 use nirspi_nets::deblur::Model;
+use nirspi_nets::interval::Readings;
 use nirspi_nets::{Images, fusion};
+use nirspi_recon::reconstruct::Method;
 use nirspi_recon::words::count_of;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -23,6 +26,7 @@ use std::process::ExitCode;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi enhance measured.npy --out sharp.npy\n\
+    \x20 nirspi enhance measured.npy --interval interval.npy --method tikhonov --sampling 0.5 --readings-noise 0.03 --out sharp.npy\n\
     \x20 nirspi enhance measured/ --depth tof.npy --spread spread.npy --out sharp/")]
 pub struct Args {
     #[command(flatten)]
@@ -32,11 +36,37 @@ pub struct Args {
     /// Steps of the deblurring network: 1 has the least error and takes the least time
     #[arg(long, value_name = "S", default_value = "1")]
     steps: NonZeroU32,
-    /// Also write the half-width of the calibrated 95 % interval of each pixel (.npy)
-    #[arg(long, value_name = "FILE")]
+    /// Also write the half-width of the calibrated 95 % interval of each pixel (.npy). An interval needs to know how the
+    /// images were made: --method, --sampling and --readings-noise
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "method",
+        requires = "sampling",
+        requires = "readings_noise"
+    )]
     interval: Option<PathBuf>,
+    /// With --interval: the method that made the images of the readings, with its default settings
+    #[arg(long, value_name = "METHOD", requires = "interval",
+          value_parser = words(Method::ALL, |method| (method.argument(), method.about())))]
+    method: Option<Method>,
+    /// With --interval: the share of the patterns that were measured, 0.1 to 1
+    #[arg(long, value_name = "S", requires = "interval")]
+    sampling: Option<f32>,
+    /// With --interval: noise of the readings: the standard deviation of a pixel of the plain transform of all patterns; white
+    /// is 1
+    #[arg(long, value_name = "N", requires = "interval")]
+    readings_noise: Option<f32>,
     #[command(flatten)]
     images: ImageArgs,
+}
+
+impl Args {
+    /// How the images were made, if that was told.
+    fn readings(&self) -> Option<Readings<'static>> {
+        let method = self.method?.argument();
+        Some(Readings { method, share: self.sampling?, noise: self.readings_noise? })
+    }
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -46,28 +76,35 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
     let target = input.target(&args.images.out)?;
+    let provenance = input.taken()?.made(made());
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let enhancer = times.time("load", || networks.enhancer(method))?;
 
     let wanted = args.interval.as_ref();
     let intervals = wanted.map(|_| networks.intervals(method, &options)).transpose()?;
+    let readings = args.readings();
+    // The refusal comes before the work.
+    if let (Some(intervals), Some(readings)) = (&intervals, &readings) {
+        intervals.table(readings)?;
+    }
 
     let bar = Progress::of("enhancing", input.count(), "images");
     let result = times.time("enhance", || {
         enhancer.enhance(images, depth.as_ref(), &options, &mut |done| bar.set(done))
     })?;
     drop(bar);
-    args.sharpening.write_spread(&input, result.spread.as_deref())?;
-    if let (Some(file), Some(intervals)) = (wanted, intervals) {
-        input.target(file)?.write(2 * fusion::SIDE, &intervals.of(&result)?)?;
+    args.sharpening.write_spread(&input, result.spread.as_deref(), &provenance)?;
+    if let (Some(file), Some(intervals), Some(readings)) = (wanted, intervals, readings) {
+        let shown = intervals.of(&result, &readings)?;
+        input.target(file)?.write(2 * fusion::SIDE, &shown, &provenance)?;
     }
-    let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced")?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced", &provenance)?;
 
     let steps = args.steps.get();
     let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);
     let report = args.images.report(&input, &networks, Some(deblurring), shown, times);
-    args.images.report.print(&report, say)
+    args.images.report.print(&report, &provenance, say)
 }
 
 /// The report in two lines.

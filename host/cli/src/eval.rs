@@ -7,16 +7,21 @@ mod table1;
 mod table3;
 mod table4;
 
-use super::camera::{ModelArgs, Rain, WeatherArgs};
+use super::camera::{LIGHT_HELP, ModelArgs, Rain, WeatherArgs, exposure};
+use super::provenance;
 use super::range;
-use super::report::{ReportArgs, to_json};
+use super::report::ReportArgs;
 use anyhow::Result;
 use clap::{Args, Subcommand};
+use nirspi::exposure::{Length, Light};
 use nirspi::files::output::OutputDir;
+use nirspi::picture::{RgbImage, signed_png};
+use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::CameraModel;
 use nirspi_eval::pictures::ANCESTRAL_STEPS;
 use nirspi_eval::shot;
 use nirspi_optics::rain::Air;
+use nirspi_recon::Order;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -68,6 +73,8 @@ struct ExposureArgs {
     /// paper's camera, which take 20 ms]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
+    #[arg(long, value_name = "TIME", conflicts_with = "frames", allow_hyphen_values = true, help = LIGHT_HELP)]
+    light: Option<Light>,
     #[command(flatten)]
     model: ModelArgs,
     /// Seed of the first picture
@@ -78,7 +85,15 @@ struct ExposureArgs {
 impl ExposureArgs {
     /// The exposure of this camera.
     fn exposure(&self, camera: &CameraModel) -> Result<shot::Exposure> {
-        let frames = self.frames.unwrap_or(camera.readout.sweeps_per_picture);
+        let readout = camera.readout;
+        let frames = match (self.light, self.frames) {
+            (None, frames) => frames.unwrap_or(readout.sweeps_per_picture),
+            (Some(light), _) => {
+                let setup = MeasurementSetup::new(&Order::Natural, 1.0)?;
+                let setup = setup.timed(readout.clocks_per_pattern, readout.blanked);
+                exposure(Length::Light(light, Some(1)), &setup)?.frames
+            }
+        };
         let air = match self.weather.read()? {
             Some(air) => air,
             None => Air::of_rainfall(self.rain.rainfall())?,
@@ -113,15 +128,16 @@ impl OutputArgs {
         &self,
         name: &str,
         report: &R,
-        picture: impl FnOnce() -> Result<Vec<u8>>,
+        picture: impl FnOnce() -> Result<RgbImage>,
         say: impl FnOnce(&R) -> Result<()>,
     ) -> Result<ExitCode> {
+        let provenance = provenance::simulated();
         if let Some(path) = &self.out {
             let mut out = OutputDir::create(path)?;
-            out.write(&format!("{name}.json"), to_json(report)?.as_bytes())?;
-            out.write(&format!("{name}.png"), &picture()?)?;
+            out.write(&format!("{name}.json"), provenance.sign(report)?.as_bytes())?;
+            out.write(&format!("{name}.png"), &signed_png(&picture()?, &provenance))?;
             out.commit()?;
         }
-        self.report.print(report, say)
+        self.report.print(report, &provenance, say)
     }
 }

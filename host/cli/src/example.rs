@@ -1,7 +1,7 @@
 //! `nirspi example`: a measurement for trying the program.
 
 use super::report::words;
-use super::{Usage, print};
+use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::example::Example;
 use nirspi::files::measurement;
@@ -34,7 +34,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Err(Usage(format!("--out {found}: expected a name that ends in .npz")).into());
     }
     let measured = args.example.measure(args.seed)?;
-    write_atomic(&path, &measurement::encode(&path, &measured, true)?)?;
+    write_atomic(&path, &measurement::encode(&path, &measured, &provenance::simulated())?)?;
     let (patterns, n) = (measured.rows().len(), measured.side().pixels());
     print::line(format_args!(
         "wrote {}: {n} x {n}, {patterns} patterns, simulated",

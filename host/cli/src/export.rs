@@ -2,6 +2,7 @@
 
 use super::camera::ModelArgs;
 use super::print;
+use super::provenance::made;
 use super::report::{ReportArgs, words};
 use anyhow::Result;
 use nirspi::export::{ExportOptions, Format, export};
@@ -57,8 +58,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         model: Some(args.model.read()?),
         enhance: args.enhance,
     };
-    let exported = export(&args.recording, &out, args.to, &options)?;
-    args.report.print(&exported, |exported| {
+    let exported = export(&args.recording, &out, args.to, &options, made())?;
+    args.report.print_answer(&exported, |exported| {
         print::notes(&exported.notes)?;
         print::line(exported)
     })
@@ -79,7 +80,7 @@ pub struct RecoverArgs {
 
 pub fn recover(args: &RecoverArgs) -> Result<ExitCode> {
     let recovered = recovered(&args.recording, &Target::New(args.out.clone()))?;
-    args.report.print(&recovered, |recovered| print::line(recovered))
+    args.report.print_answer(&recovered, |recovered| print::line(recovered))
 }
 
 /// Fit the clocks of cameras that were recorded side by side, and give all frames one time: the computer's
@@ -100,5 +101,5 @@ pub struct SyncArgs {
 
 pub fn sync(args: &SyncArgs) -> Result<ExitCode> {
     let synced = recordings(&args.recordings, args.out.as_deref())?;
-    args.report.print(&synced, |s| print::notes(&s.notes).and_then(|()| print::line(s)))
+    args.report.print_answer(&synced, |s| print::notes(&s.notes).and_then(|()| print::line(s)))
 }

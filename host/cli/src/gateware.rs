@@ -52,7 +52,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     drop(bar);
     let version = loaded.with_context(|| file.to_string())?;
     let report = Report { bytes: bitstream.len(), gateware: of_register(version) };
-    args.report.print(&report, |report| {
+    args.report.print_answer(&report, |report| {
         print::line(format_args!("the FPGA runs gateware {}", report.gateware))
     })
 }

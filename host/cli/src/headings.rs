@@ -5,7 +5,10 @@ use clap::builder::Resettable;
 use clap::{Arg, Command};
 
 const HEADINGS: [(&str, &[&str]); 8] = [
-    ("Measurement", &["frames", "sum", "sampling", "order", "orders", "sweeps", "white", "dark"]),
+    (
+        "Measurement",
+        &["frames", "light", "sum", "sampling", "order", "orders", "sweeps", "white", "dark"],
+    ),
     ("Input", &["resize", "depth"]),
     ("Networks", &["ancestral", "inception"]),
     ("One sphere", &["mie", "x", "m-re", "m-im"]),

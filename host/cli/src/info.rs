@@ -28,9 +28,11 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(recording) = &args.recording {
-        return args.report.print(&RecordingInfo::read(recording)?, |info| print::line(info));
+        return args
+            .report
+            .print_answer(&RecordingInfo::read(recording)?, |info| print::line(info));
     }
     let scene = SceneArgs::white_sheet(&args.model, 1);
     let report = info(&mut address::open_quietly(&args.camera.camera, &scene)?)?;
-    args.report.print(&report, |report| print::line(report))
+    args.report.print_answer(&report, |report| print::line(report))
 }

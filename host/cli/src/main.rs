@@ -29,6 +29,7 @@ mod networks;
 mod packaging;
 mod print;
 mod progress;
+mod provenance;
 mod rain;
 mod range;
 mod reconstruct;
@@ -154,6 +155,8 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    // The date of everything that this run writes.
+    provenance::made();
     settings.begin(&cli.general);
     if !interrupt::ignores_hangup() {
         // Without a handler, signals end the program as usual.

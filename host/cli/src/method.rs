@@ -3,14 +3,13 @@
 use super::Usage;
 use super::report::words;
 use anyhow::{Context, Result};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, FromArgMatches};
 use nirspi::imaging::MethodReport;
 use nirspi::reconstruct::{Recipe, Solver, own_atoms, read_atoms};
 use nirspi::source::FirstPatterns;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{
-    self, Completion, Method, MethodSettings, Reconstruct, ReconstructError, Sparsity, Strength,
+    self, Method, MethodSettings, Reconstruct, ReconstructError, Sparsity, Strength,
 };
 use nirspi_recon::{Basis, Image, Measurements, Sampling};
 use std::path::PathBuf;
@@ -43,15 +42,11 @@ pub struct MethodArgs {
     #[arg(long, value_name = "S")]
     pub strength: Option<f64>,
     /// OMP: the paper's Algorithm 1 as printed, with no prior and no cross-validation; the image is exactly sparse
-    #[arg(long, requires = "sparsity", conflicts_with = "keep")]
+    #[arg(long, requires = "sparsity")]
     pub as_printed: bool,
     /// OMP: no negative light. This needs --basis pixel or --dictionary
     #[arg(long, conflicts_with = "as_printed")]
     pub non_negative: bool,
-    /// Keep the values of patterns that were measured (`measured`), or replace them by the fit (`sparse`) [default:
-    /// measured; sparse with --non-negative, because measurement noise would make pixels negative]
-    #[arg(long, value_parser = completions())]
-    pub keep: Option<Completion>,
     /// OMP: where to compute: auto, cpu, wgpu or cuda. One image is too little work for a GPU, so auto is the cpu
     #[arg(long, value_name = "BACKEND", default_value_t = Backend::Auto)]
     pub backend: Backend,
@@ -63,11 +58,6 @@ impl Default for MethodArgs {
         let mut matches = Self::augment_args(clap::Command::new("")).get_matches_from([""]);
         Self::from_arg_matches_mut(&mut matches).unwrap_or_else(|error| error.exit())
     }
-}
-
-fn completions() -> impl TypedValueParser<Value = Completion> {
-    PossibleValuesParser::new(Completion::ALL.map(Completion::name))
-        .try_map(|word| word.parse::<Completion>())
 }
 
 impl MethodArgs {
@@ -122,7 +112,6 @@ impl MethodArgs {
             as_printed: self.as_printed,
             non_negative: self.non_negative,
             strength: self.strength.map_or_else(Strength::default, Strength::Fixed),
-            completion: self.keep,
             backend: self.backend,
             network: Some(nirspi_nets::prior::shipped()),
         })

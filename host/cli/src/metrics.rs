@@ -2,7 +2,7 @@
 
 use super::progress::Progress;
 use super::report::ReportArgs;
-use super::{print, refused};
+use super::{print, provenance, refused};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use nirspi_eval::Fid;
@@ -19,7 +19,7 @@ use std::process::ExitCode;
 /// classifier and needs at least two images of 64 x 64 pixels; FID needs your own Inception weights. The report is JSON.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy\n\
+    \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy --align gain-offset\n\
     \x20 nirspi metrics full/ third/ --align gain-offset\n\
     \x20 nirspi metrics sharp.npy deblurred.npy --labels labels.npy --legibility\n\
     \x20 nirspi metrics sharp.npy deblurred.npy --inception inception.safetensors")]
@@ -80,6 +80,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         sets::compare(&reference, &test, &options, &|| bar.add(1)).with_context(named)?;
     drop(bar);
     let align = if args.align.is_some() { "gain-offset" } else { "none" };
-    print::json(&Report { align, data_range, comparison })?;
+    print::json(&Report { align, data_range, comparison }, &provenance::computed())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -8,6 +8,7 @@ use nirspi::files::stack::ImageStack;
 use nirspi::imaging::{Deblurring, StackReport};
 use nirspi::picture::Pictures;
 use nirspi_nets::{Arithmetic, Backend, Device, Images, Networks, WeightsError};
+use nirspi_recon::words::count_of;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -45,9 +46,17 @@ pub struct ImageArgs {
 }
 
 impl ImageArgs {
-    /// Reads the images, which must have this side.
+    /// Reads the images, which must have this side. Noise below black and above white is cut.
     pub fn read(&self, side: usize) -> Result<ImageStack> {
-        Ok(ImageStack::read(&self.input, self.resize.then_some(side as u32))?)
+        let mut images = ImageStack::read(&self.input, self.resize.then_some(side as u32))?;
+        let cut = images.cut_noise();
+        if cut > 0 {
+            let (path, values) = (self.input.display(), count_of(cut, "value"));
+            let note =
+                format!("{path}: {values} below 0 or above 1, by noise, are read as 0 and 1");
+            if self.report.json { print::remark(note) } else { print::note(note)? }
+        }
+        Ok(images)
     }
 }
 

@@ -5,6 +5,7 @@
 //! (`a_reader_that_stops_reading_is_no_failure` in `host/cli/tests/cli/arguments.rs`).
 
 use anyhow::{Context, Result};
+use nirspi::provenance::Provenance;
 use serde::Serialize;
 use std::fmt;
 use std::io::{self, Write};
@@ -43,9 +44,14 @@ pub fn notes(notes: &[String]) -> Result<()> {
     notes.iter().try_for_each(note)
 }
 
-/// Prints a report as JSON.
-pub fn json(report: &(impl Serialize + ?Sized)) -> Result<()> {
-    line(serde_json::to_string_pretty(report)?)
+/// Prints a report with its provenance as JSON.
+pub fn json(report: &(impl Serialize + ?Sized), provenance: &Provenance) -> Result<()> {
+    line(provenance.sign(report)?.trim_end())
+}
+
+/// Prints an answer that is no report of readings, such as a list of devices, as JSON.
+pub fn json_answer(answer: &(impl Serialize + ?Sized)) -> Result<()> {
+    line(serde_json::to_string_pretty(answer)?)
 }
 
 /// Prints one line on stderr. If stderr is closed too, the exit code alone reports the failure.

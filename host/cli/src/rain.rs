@@ -2,12 +2,12 @@
 //! simulator's uniformity.
 
 use super::camera::ModelArgs;
-use super::{Usage, print, refused};
-use crate::report::{ReportArgs, to_json};
+use super::{Usage, print, provenance, refused};
+use crate::report::ReportArgs;
 use anyhow::{Context, Result};
-use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
 use nirspi::files::table::Table;
+use nirspi::picture::signed_png;
 use nirspi::weather::{is_drop_file, read_drops};
 use nirspi_eval::rain::budget::{self, Settings, Term};
 use nirspi_eval::rain::{self, RainReport, curves, rig};
@@ -120,10 +120,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     } else if let Some(path) = &args.uniformity {
         let volumes = Table::read(path)?.last_column()?;
         let report = rig::measured(&volumes).with_context(|| path.display().to_string())?;
-        args.report.print(&report, say_uniformity)
+        args.report.print(&report, &provenance::simulated(), say_uniformity)
     } else if args.rig {
         let report = rig::simulated(args.tilt_deg, args.seed).map_err(refused)?;
-        args.report.print(&report, say_uniformity)
+        args.report.print(&report, &provenance::simulated(), say_uniformity)
     } else if args.budget {
         let settings = Settings {
             drops: args.drops.drops()?,
@@ -134,7 +134,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             camera: args.model.read()?,
         };
         let report = budget::budget(&settings).map_err(refused)?;
-        args.report.print(&report, say_budget)
+        args.report.print(&report, &provenance::simulated(), say_budget)
     } else {
         let (name, drops) = (&args.drops.drops, args.drops.drops()?);
         let radar = !name.starts_with("fog");
@@ -143,16 +143,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let report = RainReport { asked_mm_per_h: args.drops.asked_mm_per_h(), ..report };
         if let Some(path) = &args.out {
             let curves = curves::curves(name, &drops, &args.wavelengths_nm).map_err(refused)?;
+            let provenance = provenance::simulated();
             let mut out = OutputDir::create(path)?;
             for curves in &curves {
-                let picture = encode_rgb(&curves.chart.render());
+                let picture = signed_png(&curves.chart.render(), &provenance);
                 out.write(&format!("{}.png", curves.name), &picture)?;
                 out.write(&format!("{}.csv", curves.name), curves.csv().as_bytes())?;
             }
-            out.write("rain.json", to_json(&report)?.as_bytes())?;
+            out.write("rain.json", provenance.sign(&report)?.as_bytes())?;
             out.commit()?;
         }
-        args.report.print(&report, |report| {
+        args.report.print(&report, &provenance::simulated(), |report| {
             say(report)?;
             args.out.as_ref().map_or(Ok(()), |path| {
                 let path = path.display();
@@ -168,7 +169,7 @@ fn sphere(args: &Args) -> Result<ExitCode> {
     };
     let index = Index { real: m_re, imaginary: args.m_im };
     let report = rain::sphere(x, index).map_err(refused)?;
-    args.report.print(&report, |report| {
+    args.report.print(&report, &provenance::simulated(), |report| {
         print::line(format_args!("x = {x}, m = {m_re} + {}i", args.m_im))?;
         print::line(format_args!("Q_ext  {:.9e}", report.qext))?;
         print::line(format_args!("Q_sca  {:.9e}", report.qsca))?;

@@ -1,11 +1,11 @@
 //! `nirspi range`: the range of the camera in rain (the paper's Algorithm 2 and Table 2).
 
 use super::camera::ModelArgs;
-use super::{print, refused};
-use crate::report::{ReportArgs, to_json};
+use super::{print, provenance, refused};
+use crate::report::ReportArgs;
 use anyhow::Result;
-use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
+use nirspi::picture::signed_png;
 use nirspi_eval::camera_model::{resolution_chart, snr_chart};
 use nirspi_eval::range::{Report, Settings, exposure_chart, picture, range};
 use std::path::PathBuf;
@@ -50,17 +50,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         camera: args.model.read()?,
     };
     let report = range(&settings).map_err(refused)?;
+    let provenance = provenance::simulated();
     if let Some(out) = &args.out {
         let mut out = OutputDir::create(out)?;
-        out.write("range.png", &encode_rgb(&picture(&settings)?))?;
-        out.write("exposure.png", &encode_rgb(&exposure_chart(&settings)?.render()))?;
+        out.write("range.png", &signed_png(&picture(&settings)?, &provenance))?;
+        out.write("exposure.png", &signed_png(&exposure_chart(&settings)?.render(), &provenance))?;
         let camera = &settings.camera;
-        out.write("resolution.png", &encode_rgb(&resolution_chart(camera)?.render()))?;
-        out.write("snr.png", &encode_rgb(&snr_chart(camera)?.render()))?;
-        out.write("range.json", to_json(&report)?.as_bytes())?;
+        out.write("resolution.png", &signed_png(&resolution_chart(camera)?.render(), &provenance))?;
+        out.write("snr.png", &signed_png(&snr_chart(camera)?.render(), &provenance))?;
+        out.write("range.json", provenance.sign(&report)?.as_bytes())?;
         out.commit()?;
     }
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {

@@ -9,6 +9,7 @@ pub use archive::FolderArgs;
 use super::camera::parse_order;
 use super::method::MethodArgs;
 use super::progress::Progress;
+use super::provenance::made;
 use super::report::{ReportArgs, StageTimes, stages};
 use super::source::SourceArgs;
 use super::{Usage, print};
@@ -48,9 +49,13 @@ pub struct Args {
     method: MethodArgs,
     /// Patterns of your own instead of Hadamard rows: (M, n * n) weights, one pattern in each row. `y` in the input then has
     /// one reading for each pattern, and --strength is relative to the variance of the readings
-    #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "keep", "residual", "stop_at_noise", "as_printed",
+    #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed",
           "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
+    /// With --matrix: fit no dark level. By default one constant (ambient light, the offset of an amplifier) is fitted with
+    /// the image
+    #[arg(long, requires = "matrix")]
+    no_dark: bool,
     /// With --index all: start each frame from the frames before. omp starts from their atoms, as long as the result explains
     /// the readings as well; the other methods from their patterns, moved with the scene and weighted by what is left of them
     #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]
@@ -94,9 +99,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let source = times.time("read", || args.source.load())?;
     let solver = args.method.solver(first, args.sampling)?;
     let (input, enhance, out) = (&*args.source.input, args.enhance, &*args.out);
-    let request = OneImage { input, solver: &solver, enhance, out };
+    let made = made();
+    let request = OneImage { input, solver: &solver, enhance, out, made };
     let report = one_image(&request, source, times)?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
 }
 
 /// Reconstructs and enhances the frames of a capture as one image. The folder `out` gets the files
@@ -108,13 +114,15 @@ pub fn picture(
     out: &Path,
 ) -> Result<Vec<String>> {
     let solver = MethodArgs::default().solver(FirstPatterns::LowestSequencies, Sampling::ALL)?;
-    let request = OneImage { input: recording, solver: &solver, enhance: true, out };
+    let made = made();
+    let request = OneImage { input: recording, solver: &solver, enhance: true, out, made };
     let mut source = Source::of_capture(captured)?;
     if let Some(kept) = flat_field {
         source = source.with_flat_field(kept);
     }
     let report = one_image(&request, source, stages())?;
-    Ok(report.enhancement.map(|enhancement| enhancement.warnings).unwrap_or_default())
+    let of_networks = report.enhancement.map(|enhancement| enhancement.warnings);
+    Ok(report.warnings.into_iter().chain(of_networks.unwrap_or_default()).collect())
 }
 
 fn one_image(request: &OneImage<'_>, source: Source, times: StageTimes) -> Result<OneReport> {

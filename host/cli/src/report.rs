@@ -3,6 +3,7 @@
 use super::print;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use nirspi::provenance::Provenance;
 pub use nirspi::stage_times::StageTimes;
 use serde::Serialize;
 use std::process::ExitCode;
@@ -17,24 +18,34 @@ pub struct ReportArgs {
 }
 
 impl ReportArgs {
-    /// Prints the report of a command that has done its work, as JSON or in words.
+    /// Prints the report of a command that has done its work, as JSON with its provenance or in words.
     pub fn print<R: Serialize + ?Sized>(
         self,
         report: &R,
+        provenance: &Provenance,
         say: impl FnOnce(&R) -> Result<()>,
     ) -> Result<ExitCode> {
         if self.json {
-            print::json(report)?;
+            print::json(report, provenance)?;
         } else {
             say(report)?;
         }
         Ok(ExitCode::SUCCESS)
     }
-}
 
-/// A report as written to a file, in a readable form.
-pub fn to_json(report: &impl Serialize) -> Result<String> {
-    Ok(format!("{}\n", serde_json::to_string_pretty(report)?))
+    /// Prints an answer that is no report of readings, such as a list of devices, as JSON or in words.
+    pub fn print_answer<R: Serialize + ?Sized>(
+        self,
+        answer: &R,
+        say: impl FnOnce(&R) -> Result<()>,
+    ) -> Result<ExitCode> {
+        if self.json {
+            print::json_answer(answer)?;
+        } else {
+            say(answer)?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
 }
 
 /// Times of stages, which a user who wants detail is told.

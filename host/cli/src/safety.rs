@@ -26,7 +26,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let case = SafetyCase::of(&read_camera_model(&args.camera_model)?)
         .with_context(|| args.camera_model.clone())?;
-    args.report.print(&case, |case| {
+    args.report.print_answer(&case, |case| {
         print::line(format_args!("camera {} (computed, not measured)\n", case.camera))?;
         print::line(case.exposure_table())?;
         print::line(case.fault_table().trim_end())

@@ -3,7 +3,7 @@
 use super::camera::{CameraArgs, SceneArgs};
 use super::progress::Progress;
 use super::report::ReportArgs;
-use super::{address, print};
+use super::{address, print, provenance};
 use anyhow::{Result, bail};
 use nirspi::calibration::{KeptCalibration, path_of};
 use nirspi::selftest::{Check, LinkDemands, STAGES, SelfTest, Verdict, run as test};
@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         measured: kept.as_ref().map(|(kept, _)| kept.measured().to_owned()),
         calibration: kept.map(|(_, path)| path),
     };
-    args.report.print(&report, say)?;
+    args.report.print(&report, &provenance::of_camera(&camera), say)?;
     let failed = report.checks.iter().filter(|check| check.verdict() == Verdict::Failed);
     let failed: Vec<_> = failed.map(Check::name).collect();
     match failed.is_empty() {

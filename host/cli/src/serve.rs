@@ -3,9 +3,11 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
+use super::provenance::made;
 use super::{Usage, address, print, stop_on_signal};
 use anyhow::{Context, Result, bail};
 use nirspi::calibration::Choice;
+use nirspi::exposure::Light;
 use nirspi::link::CameraAddress;
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
 use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Server, StagedScene, Token, serve};
@@ -52,6 +54,14 @@ pub struct Args {
     #[arg(long, alias = "frames", value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
     sum: u32,
+    #[arg(
+        long,
+        value_name = "TIME",
+        conflicts_with = "sum",
+        allow_hyphen_values = true,
+        help = "Light of each image, as a time with its unit: 20ms, 0.2s. --sum and --sweeps follow from it"
+    )]
+    light: Option<Light>,
     /// Start each image from the images before, moved with the scene. Each frame is then in one image only: a new image
     /// comes after --sum new frames
     #[arg(long)]
@@ -72,10 +82,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
+    let mut sum = args.sum;
+    if let Some(light) = args.light {
+        let exposure = args.setup.exposure(light, &setup)?;
+        (sum, setup.sweeps) = (exposure.frames, exposure.sweeps);
+        if sum > MAX_FRAMES {
+            let advice = "sum more sweeps into a frame with --sweeps";
+            return Err(Usage(format!(
+                "--light {light} is {sum} frames an image, expected at most {MAX_FRAMES}: {advice}"
+            ))
+            .into());
+        }
+    }
     if let Some(folder) = args.record_to.as_ref().filter(|folder| !folder.is_dir()) {
         bail!("--record-to {}: found no such folder", folder.display());
     }
-    let mut server = Server::bind(&args.listen, args.token.clone())
+    let mut server = Server::bind(&args.listen, args.token.clone(), made())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     if let Some(place) = &args.foxglove {
         let problem = || format!("--foxglove {place}: cannot listen there");
@@ -86,7 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = Settings {
         strength: args.method.strength,
         warm_start: args.warm_start,
-        ..Settings::new(args.method.method, args.sum, &setup)
+        ..Settings::new(args.method.method, sum, &setup)
     };
     if args.warm_start {
         let refused = |why| Usage(format!("--warm-start: {why}"));

@@ -6,6 +6,7 @@ use super::report::words;
 use anyhow::Result;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nirspi::files::measurement::{Form, Selection};
+use nirspi::provenance::Taken;
 use nirspi::source::{Index, Part, Source, SourceError, SourceOptions};
 use nirspi_recon::{Measurements, Order, Side};
 use std::path::PathBuf;
@@ -98,9 +99,11 @@ impl SourceArgs {
         Source::read(&self.input, &self.options()?).map_err(usage_or_failure)
     }
 
-    /// Reads one measurement of real readings.
-    pub fn load_real(&self) -> Result<Measurements> {
-        self.load()?.real(&self.input).map_err(usage_or_failure)
+    /// Reads one measurement of real readings, and where they come from.
+    pub fn load_real(&self) -> Result<(Measurements, Taken)> {
+        let source = self.load()?;
+        let taken = source.taken.clone();
+        Ok((source.real(&self.input).map_err(usage_or_failure)?, taken))
     }
 
     /// Reads all measurements of a file or recording.

@@ -52,5 +52,5 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             loaded.with_context(|| change.path.display().to_string())?;
         }
     }
-    args.report.print(&plan, |plan| print::line(plan))
+    args.report.print_answer(&plan, |plan| print::line(plan))
 }

@@ -3,6 +3,7 @@
 use super::networks::{ImageArgs, checked};
 use super::print;
 use super::progress::Progress;
+use super::provenance::made;
 use super::report::stages;
 use anyhow::{Context, Result};
 use nirspi::files::npy::{self, Stack};
@@ -51,6 +52,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
     let target = input.target(&args.images.out)?;
+    let provenance = input.taken()?.made(made());
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn"])?;
     let fusion = times.time("load", || networks.fusion())?;
@@ -58,10 +60,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("upscaling", input.count(), "images");
     let large = times.time("upscale", || fusion.upscale(images, depth.as_ref()));
     drop(bar);
-    let shown = target.write_and_show(2 * fusion::SIDE, &large, "upscaled")?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &large, "upscaled", &provenance)?;
 
     let report = args.images.report(&input, &networks, None, shown, times);
-    args.images.report.print(&report, |report| {
+    args.images.report.print(&report, &provenance, |report| {
         print::line(format_args!(
             "{} upscaled to 64 x 64 on {}, in {}; to look at: {}",
             count_of(report.images, "image"),

@@ -12,8 +12,8 @@
 mod natural;
 
 use natural::Scenes;
-use nirspi::files::image::encode_rgb;
-use nirspi::picture::{Axis, Chart, Line, Panel, Range, SideBySide, Unit, below};
+use nirspi::picture::{Axis, Chart, Line, Panel, Range, SideBySide, Unit, below, signed_png};
+use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::completion::{Part, Row, Scene, compare, image, methods, quality};
 use nirspi_recon::reconstruct::Reconstruct;
 use nirspi_recon::{Measurements, Order, Rows, Side, metrics};
@@ -25,6 +25,12 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 type Methods = Vec<(&'static str, Box<dyn Reconstruct>)>;
 
 const SHARES: [f64; 5] = [0.05, 0.1, 0.2, 0.3, 0.5];
+
+/// The provenance of the pictures: scenes are simulated.
+fn provenance() -> Provenance {
+    let made = Made::now("learned_prior", None, std::env::args());
+    Taken::without_camera(Origin::Simulated).made(&made)
+}
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args_os().skip(1);
@@ -169,7 +175,7 @@ fn natural_tables(data: &Path, out: &Path, methods: &Methods, most: usize) -> Re
         }
     }
     let pairs: Vec<_> = charts.chunks(2).map(nirspi::picture::beside).collect();
-    std::fs::write(out.join("prior_curves.png"), encode_rgb(&below(&pairs)))?;
+    std::fs::write(out.join("prior_curves.png"), signed_png(&below(&pairs), &provenance()))?;
     Ok(())
 }
 
@@ -223,7 +229,7 @@ fn instruments(data: &Path) -> Result<Vec<(String, Vec<Measurements>)>> {
     let wing = data.join("spi/opar_ala1.npz");
     let rows = Rows::new(Side::new(64)?, array::<i32>(&wing, "h_row")?)?;
     let y: Vec<f64> = array::<f32>(&wing, "y")?.into_iter().map(f64::from).collect();
-    let wing = Measurements::from_pairs(&rows, &y)?.0;
+    let wing = Measurements::from_pairs(&rows, &y)?.measurements;
     let car = data.join("spi/scheidt_car.npz");
     let rows = Rows::new(Side::new(32)?, array::<i32>(&car, "h_row")?)?;
     let d: Vec<f64> = array::<i32>(&car, "d")?.into_iter().map(f64::from).collect();
@@ -334,6 +340,6 @@ fn pictures(data: &Path, out: &Path, methods: &Methods) -> Result<()> {
         shown.push(SideBySide { header, panels, footer });
     }
     let rendered: Vec<_> = shown.iter().map(|row| row.render_at(192)).collect();
-    std::fs::write(out.join("prior_pictures.png"), encode_rgb(&below(&rendered)))?;
+    std::fs::write(out.join("prior_pictures.png"), signed_png(&below(&rendered), &provenance()))?;
     Ok(())
 }

@@ -8,28 +8,39 @@
 //! calibration on images that neither training nor calibration has used. OUT gets `coverage.png`,
 //! `intervals.png` and `trust.json`.
 //!
-//! DATA has `chars74k/*_train.npz` and, for scenes that are no characters, `natural/bsds_train.npz`.
+//! DATA has `chars74k/*_train.npz` and `natural/bsds_train.npz`.
 
 mod natural;
 
+use image::imageops::{self, FilterType};
+use image::{ImageBuffer, Luma};
 use natural::Scenes;
 use nirspi::files::characters;
-use nirspi::files::image::encode_rgb;
-use nirspi_eval::trust::{Report, Settings, calibrate, judge};
+use nirspi::picture::signed_png;
+use nirspi::provenance::{Made, Origin, Provenance, Taken};
+use nirspi_eval::trust::{NATURAL, Report, Settings, calibrate, judge};
 use nirspi_nets::Intervals;
 use nirspi_nets::data::{Kind, Stack};
 use std::cell::Cell;
 use std::error::Error;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 const EXPECTED: &str = "expected calibrate DATA FILE [WEIGHTS] or judge DATA FILE OUT [WEIGHTS]";
 const SEED: u64 = 1;
-/// The most images of each stack of a calibration.
-const COUNT: usize = 200;
+/// The most images of each stack of characters, for calibrating and for judging.
+const COUNTS: [usize; 2] = [55, 30];
+/// Side of a part of a scene.
+const SIDE: usize = 64;
+
+/// The provenance of the pictures: scenes are simulated.
+fn provenance() -> Provenance {
+    let made = Made::now("trust", None, std::env::args());
+    Taken::without_camera(Origin::Simulated).made(&made)
+}
 
 fn main() -> Result<()> {
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
@@ -37,7 +48,9 @@ fn main() -> Result<()> {
     let (Some(what), Some(data), Some(file)) = (arguments.first(), at(1), at(2)) else {
         return Err(EXPECTED.into());
     };
-    let mut settings = Settings { stacks: stacks(&data)?, weights: None, count: COUNT, seed: SEED };
+    let mut stacks = characters::read(&data.join("chars74k"))?;
+    stacks.push(natural(&Scenes::read(&data)?)?);
+    let mut settings = Settings { stacks, weights: None, count: COUNTS[0], seed: SEED };
     let (started, done) = (Instant::now(), Cell::new(0));
     let progress = |images: usize| {
         done.set(done.get() + images);
@@ -53,12 +66,12 @@ fn main() -> Result<()> {
         }
         "judge" => {
             let out = at(3).ok_or(EXPECTED)?;
-            (settings.weights, settings.count) = (at(4), usize::MAX);
+            (settings.weights, settings.count) = (at(4), COUNTS[1]);
             let intervals = Intervals::parse(&std::fs::read_to_string(&file)?)?;
             let judged = judge(&settings, &intervals, &progress)?;
             std::fs::create_dir_all(&out)?;
             for (name, picture) in &judged.pictures {
-                std::fs::write(out.join(name), encode_rgb(picture))?;
+                std::fs::write(out.join(name), signed_png(picture, &provenance()))?;
             }
             std::fs::write(out.join("trust.json"), serde_json::to_string_pretty(&judged.report)?)?;
             say(&judged.report);
@@ -70,57 +83,70 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn stacks(data: &Path) -> Result<Vec<Stack>> {
-    let mut stacks = characters::read(&data.join("chars74k"))?;
-    if Scenes::file(data).is_file() {
-        stacks.push(natural(&Scenes::read(data)?)?);
-    }
-    Ok(stacks)
-}
-
-/// The middle 64 x 64 pixels of each scene, which is a group of its own.
+/// Six parts of each scene, which is a group of its own: three of 64 x 64 pixels at full size, two of
+/// 96 x 96 and one of 160 x 160 made smaller.
 fn natural(scenes: &Scenes) -> Result<Stack> {
-    let (top, left) = ((scenes.height - 64) / 2, (scenes.width - 64) / 2);
-    let middle = |scene: &[u8]| {
-        let rows = scene.chunks_exact(scenes.width).skip(top).take(64);
-        rows.flat_map(|row| row[left..left + 64].to_vec()).collect::<Vec<u8>>()
-    };
-    let levels = scenes.iter().flat_map(middle).collect();
-    let groups = (0..scenes.iter().count() as u32).collect();
-    Ok(Stack::new("natural", Kind::Photograph, levels, None, groups)?)
+    let (mut levels, mut groups) = (Vec::new(), Vec::new());
+    let (height, width) = (scenes.height, scenes.width);
+    let parts = [
+        (8, 8, 64),
+        ((height - 64) / 2, (width - 64) / 2, 64),
+        (height - 72, width - 72, 64),
+        (4, width - 100, 96),
+        (height - 100, 4, 96),
+        (0, (width - 160) / 2, 160.min(height)),
+    ];
+    for (group, scene) in scenes.iter().enumerate() {
+        for (top, left, side) in parts {
+            let rows = scene.chunks_exact(width).skip(top).take(side);
+            let part: Vec<u8> = rows.flat_map(|row| row[left..left + side].to_vec()).collect();
+            let part = ImageBuffer::<Luma<u8>, _>::from_raw(side as u32, side as u32, part);
+            let part = part.ok_or("a part of a scene has another size")?;
+            let small = imageops::resize(&part, SIDE as u32, SIDE as u32, FilterType::Triangle);
+            levels.extend_from_slice(if side == SIDE { part.as_raw() } else { small.as_raw() });
+            groups.push(group as u32);
+        }
+    }
+    Ok(Stack::new(NATURAL, Kind::Photograph, levels, None, groups)?)
 }
 
 fn say(report: &Report) {
-    println!("blur noise stack: within 95 %, half-width, prior's, rms error, images below 85 %");
+    println!(
+        "method, images, condition: within 95 % (edges), half-width, least, rms error, images below 85 %"
+    );
     for c in &report.coverage {
         println!(
-            "{:.1} {:.2} {:<10} {:.1} ({:.1} to {:.1}) %  {:.4}  {:.1} %  {:.4}  {:.1} %  ({} images)",
-            c.condition.sigma_px,
-            c.condition.noise,
-            c.stack,
+            "{:<8} {:<10} {:<28} {:.1} ({:.1} to {:.1}) %  edges {:.1} %  {:.4}  {:.4}  {:.4}  {:.1} %  ({} images)",
+            c.method,
+            c.images_of,
+            c.condition,
             100.0 * c.at_95.value,
             100.0 * c.at_95.low,
             100.0 * c.at_95.high,
+            100.0 * c.edges_at_95,
             c.half_width,
-            100.0 * c.prior_share,
+            c.least_half_width,
             c.rms_error,
             100.0 * c.images_below_85,
             c.images
         );
     }
-    println!("blur noise stack: right, sure, wrong and sure, not legible, right if legible");
+    println!(
+        "kind: right, legible (before), sure (before), wrong and sure, no character, right if legible"
+    );
     for l in &report.letters {
         let share =
             |share: Option<f64>| share.map_or("-".to_owned(), |s| format!("{:.1} %", 100.0 * s));
         println!(
-            "{:.1} {:.2} {:<10} {}  {:.1} %  {:.2} %  {:.1} %  {}  ({} images)",
-            l.condition.sigma_px,
-            l.condition.noise,
-            l.stack,
+            "{:<10} {}  {:.1} ({:.1}) %  {:.1} ({:.1}) %  {:.2} %  {:.1} %  {}  ({} images)",
+            l.kind,
             share(l.right),
+            100.0 * l.legible,
+            100.0 * l.legible_before,
             100.0 * l.sure,
+            100.0 * l.sure_before,
             100.0 * l.wrong_and_sure,
-            100.0 * l.not_legible,
+            100.0 * l.no_character,
             share(l.right_if_legible),
             l.images
         );

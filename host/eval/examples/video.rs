@@ -7,8 +7,10 @@
 //! a letter), `video.png` (one frame of some scenes), and `image.apng` with its contact sheet
 //! `image.png` (a moving letter: scene and best single frames above, recursive estimates below).
 
-use nirspi::files::image::encode_rgb;
-use nirspi::picture::{Axis, Chart, Line, Panel, Pictures, Range, SideBySide, Unit, below};
+use nirspi::picture::{
+    Axis, Chart, Line, Panel, Pictures, Range, SideBySide, Unit, below, signed_png,
+};
+use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::video::{Compared, Motion, VideoRow, compare};
 use nirspi_recon::{Image, Side};
 use std::error::Error;
@@ -23,6 +25,12 @@ const SEED: u64 = 1;
 /// The scenes of the picture.
 const SHOWN: [Motion; 4] =
     [Motion::Letter(0.25), Motion::Letter(2.0), Motion::Turning(10.0), Motion::Passing(1.0)];
+
+/// The provenance of the pictures: scenes are simulated.
+fn provenance() -> Provenance {
+    let made = Made::now("video", None, std::env::args());
+    Taken::without_camera(Origin::Simulated).made(&made)
+}
 
 fn main() -> Result<()> {
     let mut arguments = std::env::args_os().skip(1);
@@ -44,8 +52,11 @@ fn main() -> Result<()> {
         all.extend(made.rows);
     }
     std::fs::write(out.join("video.json"), serde_json::to_string_pretty(&all)?)?;
-    std::fs::write(out.join("video.png"), encode_rgb(&below(&pictures)))?;
-    std::fs::write(out.join("video_curves.png"), encode_rgb(&chart(&all, noise).render()))?;
+    std::fs::write(out.join("video.png"), signed_png(&below(&pictures), &provenance()))?;
+    std::fs::write(
+        out.join("video_curves.png"),
+        signed_png(&chart(&all, noise).render(), &provenance()),
+    )?;
     Ok(())
 }
 
@@ -81,6 +92,7 @@ fn picture(made: &Compared, frame: usize) -> SideBySide {
         unit: Unit::Reflectance,
         caption: vec![caption],
         warnings: Vec::new(),
+        field_mm: None,
     };
     let mut panels = vec![panel("scene".to_owned(), &made.truths[frame].pixels, String::new())];
     let turns = made.rows.len() - 1;
@@ -117,7 +129,7 @@ fn animate(out: &Path, made: &Compared) -> Result<()> {
     };
     let images: Vec<Image> = (0..made.truths.len()).map(frame).collect();
     let header = format!("{}: scene, frame by frame; recursive, in turn", made.rows[0].motion);
-    let pictures = Pictures::of_video(&header, &images, Unit::Reflectance, None);
+    let pictures = Pictures::of_video(&header, &images, Unit::Reflectance, None, &provenance());
     let mut folder = nirspi::files::output::OutputDir::create(out)?;
     pictures.write(&mut folder)?;
     folder.commit()?;

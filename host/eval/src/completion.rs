@@ -5,7 +5,7 @@
 //! [`sampling`](crate::sampling) compares methods on the readings of an instrument instead.
 
 use crate::error::{EvalError, Result};
-use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct};
+use nirspi_recon::reconstruct::{Method, Reconstruct};
 use nirspi_recon::{Image, Measurements, Order, Rows, Side, fwht, metrics};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -96,8 +96,7 @@ impl Row {
 /// # Errors
 /// [`EvalError::Library`] if a method cannot be prepared.
 pub fn methods() -> Result<Vec<(&'static str, Box<dyn Reconstruct>)>> {
-    let network = Some(nirspi_nets::prior::shipped());
-    let settings = MethodSettings { network, ..MethodSettings::default() };
+    let settings = nirspi_nets::prior::settings();
     let all = Method::ALL.iter().filter(|method| method.argument() != "pseudo-inverse");
     all.map(|method| {
         let ready = method.prepare(&settings)?;
@@ -182,7 +181,7 @@ mod tests {
         let scene = scene();
         assert_eq!((scene.pixels[17], scene.pixels[18]), (50.0 / 255.0, 200.0 / 255.0));
         let part = Part { order: Order::ZigZag, share: 1.0, noise: 0.02 };
-        let zero_filling = Method::ALL[0].prepare(&MethodSettings::default()).unwrap();
+        let zero_filling = Method::ALL[0].prepare(&nirspi_nets::prior::settings()).unwrap();
         let image = image(&scene, &part, &*zero_filling, 1).unwrap();
         let (psnr_db, _) = quality(&scene, &image).unwrap();
         // The mean of 1024 squares is known to 4 %, 0.19 dB.

@@ -12,22 +12,22 @@ pub use rows::{Difference, Row};
 
 use crate::DISTANCES_M;
 use crate::bootstrap::{DRAWS, Redraws};
-use crate::error::Result;
+use crate::error::{EvalError, Result};
 use crate::fid::Fid;
 use crate::pictures::{Enhancers, Picture};
 use crate::quality::halved;
 use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
 use crate::typefaces::{self, CHARACTERS, of_scene};
 use image::RgbImage;
-use nirspi::imaging::{Quality, compare};
-use nirspi::picture::{Panel, SideBySide, Typeface, Unit, stacked};
+use nirspi::imaging::{Fit, score, share_of_white};
+use nirspi::picture::{Panel, Range, SideBySide, Typeface, Unit, stacked};
 use nirspi::scene::SceneMap;
 use nirspi_nets::images::Images;
 use nirspi_nets::metrics::{CharacterJudge, Judged as Features};
 use nirspi_nets::{Weights, upscale_2x};
 use nirspi_optics::rain::Air;
 use nirspi_optics::{CameraModel, Scene};
-use nirspi_recon::{Image, Side};
+use nirspi_recon::Image;
 use rayon::prelude::*;
 use rows::{Measured, Statistics};
 use serde::Serialize;
@@ -106,7 +106,7 @@ struct Taken {
     distance_m: f64,
     wet: Shots,
     dry: Shots,
-    blank: Quality,
+    blank: Scores,
 }
 
 /// All pictures and networks of the table. Each picture is taken once.
@@ -141,7 +141,7 @@ impl Table {
                 let wet = take(&camera, &exposure, &exposure.air, distance_m, (&typefaces, i))?;
                 let dry = take(&camera, &exposure, &dry_air, distance_m, (&typefaces, i))?;
                 let blank = Image::new(wet.nir_spi.side(), vec![0.0; wet.truth.len()]);
-                let blank = compare(&blank, &wet.truth)?.quality;
+                let blank = scores(&blank, &wet.truth)?;
                 done();
                 Ok(Taken { distance_m, wet, dry, blank })
             })
@@ -207,7 +207,7 @@ impl Table {
         let exposure = &settings.exposure;
         let shot = |air: &Air| take(camera, exposure, air, distance_m, (typefaces, SHOWN));
         let (wet, dry) = (shot(&exposure.air)?, shot(&Air::dry())?);
-        let blank = compare(&wet.nir_spi, &wet.truth)?.quality;
+        let blank = scores(&wet.nir_spi, &wet.truth)?;
         let taken = [Taken { distance_m, wet, dry, blank }];
         let mut panels = Vec::new();
         for paper in self.images() {
@@ -219,7 +219,8 @@ impl Table {
                     "PSNR {:.1} dB  SSIM {:.2}",
                     judged.quality.psnr_db, judged.quality.ssim
                 )],
-                ..Panel::square(&title, 64, &judged.fine, Unit::Reflectance)
+                range: Range::Unit,
+                ..Panel::square(&title, judged.shown.len().isqrt(), &judged.shown, Unit::OfWhite)
             }));
         }
         let face = of_scene(SHOWN as usize, typefaces.len()).1;
@@ -231,7 +232,7 @@ impl Table {
                 exposure.air.name()
             ),
             panels,
-            footer: "simulated: virtual camera; VIS is a model of a small industrial camera"
+            footer: "simulated: virtual camera; VIS is a model of a small industrial camera; 0 is black, the white sheet is white"
                 .to_owned(),
         })
     }
@@ -255,12 +256,36 @@ fn white_at(whites: &[f32; 3], distance_m: f64) -> f32 {
     whites[at.unwrap_or(0)]
 }
 
+/// PSNR in dB and SSIM.
+#[derive(Debug, Clone, Copy)]
+struct Scores {
+    psnr_db: f64,
+    ssim: f64,
+}
+
+/// The scores of an image after the gain and offset of least squares.
+fn scores(image: &Image, truth: &[f32]) -> Result<Scores> {
+    let quality = score(image, truth)?;
+    match (quality.psnr_db, quality.ssim) {
+        (Some(psnr_db), Some(ssim)) => Ok(Scores { psnr_db, ssim }),
+        _ => Err(EvalError::Content(quality.no_psnr.unwrap_or_default().to_owned())),
+    }
+}
+
 /// A picture with its figures.
 struct Judged {
     /// The picture on the 32 x 32 grid.
-    quality: Quality,
-    /// The picture at 64 x 64, on the truth's scale.
+    quality: Scores,
+    /// The picture at 64 x 64 on the truth's scale, for the distances of sets alone.
     fine: Vec<f32>,
+    /// The picture for people: a square of shares of white, not fitted.
+    shown: Vec<f32>,
+}
+
+/// An image on the truth's scale, for scores alone.
+fn fitted(image: &[f32], truth: &[f32]) -> Vec<f32> {
+    let fit = Fit::of(image, truth);
+    image.iter().map(|&pixel| fit.apply(pixel).clamp(0.0, 1.0)).collect()
 }
 
 /// Every scene in the form of a row. Networks give 64 x 64. PSNR and SSIM use means of 2 x 2 of
@@ -276,20 +301,25 @@ fn judged(
     let shots: Vec<&Shots> = taken.iter().map(of).collect();
     let levels: Vec<f32> = taken.iter().map(|t| white_at(whites, t.distance_m)).collect();
     let Some(pictures) = enhancers.pictures(image, &shots, &levels)? else {
-        let camera = |shot: &&Shots| {
-            let picture = if image == Picture::Vis { &shot.vis } else { &shot.nir_spi };
-            let fitted = compare(picture, &shot.truth)?;
-            let fine = upscale_2x(&fitted.values, 1, 32, 32)?;
-            Ok(Judged { quality: fitted.quality, fine })
+        let camera = |(shot, &white): (&&Shots, &f32)| {
+            // The ordinary camera reports reflectance; the single-pixel camera, ADC counts.
+            let is_vis = image == Picture::Vis;
+            let (picture, white) = if is_vis { (&shot.vis, 1.0) } else { (&shot.nir_spi, white) };
+            Ok(Judged {
+                quality: scores(picture, &shot.truth)?,
+                fine: upscale_2x(&fitted(picture.pixels(), &shot.truth), 1, 32, 32)?,
+                shown: share_of_white(picture, white).pixels().to_vec(),
+            })
         };
-        return shots.iter().map(camera).collect();
+        return shots.iter().zip(&levels).map(camera).collect();
     };
-    let side = Side::new(64)?;
     let network = |(picture, shot): (Vec<f32>, &&Shots)| {
         let coarse = Image::new(shot.nir_spi.side(), halved(&picture));
-        let quality = compare(&coarse, &shot.truth)?.quality;
-        let fine = compare(&Image::new(side, picture), &shot.truth_fine)?.values;
-        Ok(Judged { quality, fine })
+        Ok(Judged {
+            quality: scores(&coarse, &shot.truth)?,
+            fine: fitted(&picture, &shot.truth_fine),
+            shown: picture,
+        })
     };
     pictures.into_iter().zip(&shots).map(network).collect()
 }

@@ -1,27 +1,33 @@
 //! How far enhanced images and read characters can be trusted: makes the calibration of intervals
 //! and readings, and judges both on images that the calibration has not used.
 //!
-//! The groups outside the training data (font families, writers, photographs) are halved: the
-//! calibration uses one half, the judging the other.
+//! The groups outside the training data (font families, writers, photographs, natural scenes) are
+//! halved: the calibration uses one half, the judging the other. The virtual camera measures the
+//! scenes, every method of reconstruction makes images of the readings, and the networks enhance
+//! them, as the commands do.
 //!
 //! # Invariant
-//! No group is in both halves (`tests::no_group_is_in_both_halves_and_none_is_lost`).
+//! No group is in both halves (`tests::no_group_is_in_both_halves_and_none_is_lost`). Natural scenes
+//! that the learned method of reconstruction has seen in its training neither calibrate nor judge it.
 
 mod charts;
 mod coverage;
 mod learn;
 mod letters;
+mod others;
+mod shots;
 
 pub use coverage::Covered;
 pub use learn::calibrate;
 pub use letters::Letters;
 
 use crate::error::{EvalError, Result};
-use crate::quality::{Characters, Condition, Origin};
+use crate::quality::{Characters, Origin};
 use image::RgbImage;
 use nirspi_nets::data::Stack;
 use nirspi_nets::interval::{Intervals, NETWORKS};
-use nirspi_nets::{Device, Enhanced, Enhancer, HELD_OUT, Images, Method, Networks, Options};
+use nirspi_nets::metrics::CharacterJudge;
+use nirspi_nets::{Device, Enhancer, HELD_OUT, Method, Networks};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
@@ -31,6 +37,11 @@ use std::path::PathBuf;
 
 /// Number of pixels of an enhanced image.
 const AREA: usize = nirspi_nets::deblur::SIDE * nirspi_nets::deblur::SIDE;
+
+/// The stack of natural scenes, by its name in the list of held-out groups.
+pub const NATURAL: &str = "natural";
+/// The list of natural scenes that the learned method of reconstruction has not seen.
+const NATURAL_OF_PRIOR: &str = "natural_of_prior";
 
 /// Seed of the halves. The halves belong to the shipped calibration and do not follow the seed of
 /// the images.
@@ -52,7 +63,7 @@ pub struct Settings {
     pub stacks: Vec<Stack>,
     /// Folder of other weights, `<network>.safetensors`.
     pub weights: Option<PathBuf>,
-    /// The most images of each stack.
+    /// The most images of each stack of characters, a third of those of natural scenes.
     pub count: usize,
     /// Seed of the choice of images, of their blur and of the noise.
     pub seed: u64,
@@ -81,9 +92,33 @@ impl Settings {
         Ok(found.collect())
     }
 
+    /// The natural scenes that the learned method of reconstruction has not seen.
+    fn unseen_by_prior(&self) -> Result<Vec<u32>> {
+        Ok(crate::quality::groups(HELD_OUT)?.remove(NATURAL_OF_PRIOR).unwrap_or_default())
+    }
+
+    /// Characters of groups that training has seen, `count` of each stack.
+    fn training_images(&self, count: usize) -> Result<Characters> {
+        let held_out = crate::quality::groups(HELD_OUT)?;
+        let of = |stack: &Stack| {
+            let hidden = held_out.get(stack.name()).map_or(&[][..], Vec::as_slice);
+            let seen = stack.groups().iter().copied().filter(|group| !hidden.contains(group));
+            let labelled = stack.label(0).is_some() && held_out.contains_key(stack.name());
+            (stack.name().to_owned(), if labelled { seen.collect() } else { Vec::new() })
+        };
+        let groups = self.stacks.iter().map(of).collect();
+        let images = Characters::of(&self.stacks, &groups, count, self.seed);
+        match images.is_empty() {
+            true => Err(EvalError::Content("no characters of training".to_owned())),
+            false => Ok(images),
+        }
+    }
+
     /// The images of one half.
     fn images(&self, half: Half) -> Result<Characters> {
-        let images = Characters::of(&self.stacks, &self.groups(half)?, self.count, self.seed);
+        // Natural scenes are the harder half of what a camera sees.
+        let count = |stack: &str| self.count * if stack == NATURAL { 3 } else { 1 };
+        let images = Characters::of_each(&self.stacks, &self.groups(half)?, &count, self.seed);
         match images.is_empty() {
             true => Err(EvalError::Content("no image that training has not seen".to_owned())),
             false => Ok(images),
@@ -110,49 +145,12 @@ fn enhancer(networks: &mut Networks) -> Result<Enhancer> {
 
 /// Fingerprint of each network that decides about the intervals and readings.
 fn fingerprints(networks: &mut Networks) -> Result<BTreeMap<String, String>> {
-    let all = NETWORKS.into_iter().chain(["classifier"]);
+    let all = NETWORKS.into_iter().chain(["prior", "classifier"]);
     all.map(|network| Ok((network.to_owned(), networks.weights(network)?.fingerprint()))).collect()
 }
 
-/// Enhances the readings of images, each under its own condition, with the defaults of every
-/// command.
-fn enhanced(
-    enhancer: &Enhancer,
-    images: &Characters,
-    conditions: &[Condition],
-    seed: u64,
-    done: &dyn Fn(usize),
-) -> Result<Enhanced> {
-    let each = images.iter().zip(conditions).enumerate();
-    let readings: Vec<f32> = each
-        .flat_map(|(k, (image, condition))| condition.read(&image.sharp, seed, k as u64))
-        .collect();
-    let mut told = 0;
-    let mut progress = |all: usize| {
-        done(all.saturating_sub(told));
-        told = all.max(told);
-    };
-    Ok(enhancer.enhance(Images::new(&readings)?, None, &Options::default(), &mut progress)?)
-}
-
-/// The conditions of the judging: the targets first, at blur 1 to 3 px and noise 3 %.
-const CONDITIONS: [Condition; 9] = [
-    Condition { sigma_px: 1.0, noise: 0.03 },
-    Condition { sigma_px: 2.0, noise: 0.03 },
-    Condition { sigma_px: 3.0, noise: 0.03 },
-    Condition { sigma_px: 0.3, noise: 0.03 },
-    Condition { sigma_px: 4.0, noise: 0.03 },
-    Condition { sigma_px: 2.0, noise: 0.0 },
-    Condition { sigma_px: 2.0, noise: 0.01 },
-    Condition { sigma_px: 2.0, noise: 0.06 },
-    Condition { sigma_px: 2.0, noise: 0.1 },
-];
-
 /// Half of the share of images that may be wrong and called sure.
 const HALF_OF_TARGET: f64 = 0.01;
-
-/// The conditions for which the targets are set.
-const TARGETS: usize = 3;
 
 /// The result of the judging.
 #[derive(Debug, Serialize)]
@@ -163,9 +161,9 @@ pub struct Report {
     pub seed: u64,
     /// The stacks of the judging half.
     pub images: Vec<Origin>,
-    /// Coverage by condition and stack.
+    /// Coverage by method, kind of image and condition.
     pub coverage: Vec<Covered>,
-    /// Readings of characters by condition and stack.
+    /// Readings by kind of image.
     pub letters: Vec<Letters>,
 }
 
@@ -187,35 +185,25 @@ pub fn judge(settings: &Settings, intervals: &Intervals, done: &dyn Fn(usize)) -
     for network in NETWORKS.into_iter().chain(["classifier"]) {
         intervals.expect(network, &networks.weights(network)?)?;
     }
-    let enhancer = enhancer(&mut networks)?;
-    let reader = letters::reader(&mut networks, intervals.calibration().characters)?;
+    let studio = shots::Studio::new(enhancer(&mut networks)?, settings.seed)?;
     let images = settings.images(Half::Judging)?;
-    let (mut coverage, mut read, mut shown) = (Vec::new(), Vec::new(), Vec::new());
-    for (at, condition) in CONDITIONS.into_iter().enumerate() {
-        let conditions = vec![condition; images.len()];
-        let made = enhanced(&enhancer, &images, &conditions, settings.seed, done)?;
-        coverage.extend(coverage::covered(intervals, &images, &made, condition)?);
-        read.extend(letters::judged(&reader, &images, &made, condition)?);
-        if at == charts::SHOWN {
-            shown = charts::cases(intervals, &reader, &images, &made)?;
-        }
-    }
-    let pictures = vec![
-        ("coverage.png", charts::curve(&coverage)),
-        ("intervals.png", charts::picture(shown, CONDITIONS[charts::SHOWN])),
-    ];
+    let mut rng = Pcg64Mcg::seed_from_u64(settings.seed.wrapping_add(JUDGING_SEED));
+    let shots = learn::taken(settings, &studio, &images, &mut rng, done)?;
+    let ones = coverage::each(intervals, &studio, &images, &shots)?;
+    let coverage = coverage::covered(&studio, &ones);
+    let judge = CharacterJudge::new(&networks.weights("classifier")?)?;
+    let cases = letters::cases(settings, Half::Judging, &judge, &studio, &images, &shots, done)?;
+    let read = letters::judged(&intervals.calibration().characters, &cases);
+    let shown = charts::cases(intervals, &studio, &shots)?;
+    let pictures =
+        vec![("coverage.png", charts::curve(&coverage)), ("intervals.png", charts::picture(shown))];
     let images = images.origins().to_vec();
     let report = Report { simulated: true, seed: settings.seed, images, coverage, letters: read };
     Ok(Judged { report, pictures })
 }
 
-/// Number of images that [`judge`] enhances.
-///
-/// # Errors
-/// As [`judge`].
-pub fn images_to_judge(settings: &Settings) -> Result<usize> {
-    Ok(CONDITIONS.len() * settings.images(Half::Judging)?.len())
-}
+/// Added to the seed for the conditions of the judging.
+const JUDGING_SEED: u64 = 1000;
 
 #[cfg(test)]
 mod tests {

@@ -12,9 +12,7 @@ use crate::completion::{Scene, quality};
 use crate::error::{EvalError, Result};
 use nirspi::picture::Typeface;
 use nirspi::scene::SceneMap;
-use nirspi_recon::reconstruct::{
-    Method, MethodSettings, Reconstruct, Recursive, RecursiveSettings,
-};
+use nirspi_recon::reconstruct::{Method, Reconstruct, Recursive, RecursiveSettings};
 use nirspi_recon::{Image, Measurements, Order, Rows, Side};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -238,8 +236,7 @@ impl Maker {
 
 /// A method with its defaults.
 fn prepared(method: Method) -> Result<Box<dyn Reconstruct>> {
-    let network = Some(nirspi_nets::prior::shipped());
-    Ok(method.prepare(&MethodSettings { network, ..MethodSettings::default() })?)
+    Ok(method.prepare(&nirspi_nets::prior::settings())?)
 }
 
 /// One way of making one video.

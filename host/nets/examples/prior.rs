@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p nirspi-nets --example prior`
 
-use nirspi_recon::reconstruct::{Method, MethodSettings};
+use nirspi_recon::reconstruct::Method;
 use nirspi_recon::{Measurements, Order, Rows, Side};
 use std::time::Instant;
 
@@ -22,8 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     nirspi_recon::fwht(&mut d)?;
     let all = Measurements::from_differential(&Rows::natural(Side::new(SIDE as u64)?), &d)?;
     let part = all.take(Some(&Order::ZigZag), 0.3)?;
-    let network = Some(nirspi_nets::prior::shipped());
-    let settings = MethodSettings { network, ..MethodSettings::default() };
+    let settings = nirspi_nets::prior::settings();
     for method in [Method::TIKHONOV, Method::PRIOR] {
         let ready = method.prepare(&settings)?;
         let made = ready.reconstruct(&part)?;

@@ -39,6 +39,16 @@ pub const SIDE: usize = crate::deblur::SIDE;
 /// Factor on the expected radius of the ball.
 const TAU: f32 = 1.1;
 
+/// Inconsistency above which the readings contradict the image. An image that agrees with its
+/// readings has 1.1 or less, the radius to which the networks' result is moved.
+pub const CONTRADICTED: f32 = 1.2;
+
+/// Whether this inconsistency says that the readings contradict the image. NaN does.
+#[must_use]
+pub fn is_contradicted(inconsistency: f32) -> bool {
+    inconsistency > CONTRADICTED || inconsistency.is_nan()
+}
+
 /// Smallest standard deviation assumed for the readings, because the estimated blur is not exact
 /// and no true blur is exactly Gaussian.
 const NOISE_FLOOR: f32 = 0.004;

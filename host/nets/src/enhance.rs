@@ -91,6 +91,21 @@ pub struct Enhanced {
 }
 
 impl Enhanced {
+    /// The images one by one.
+    pub fn each(self) -> impl Iterator<Item = Self> {
+        fn part(all: Option<&Vec<f32>>, at: usize) -> Option<Vec<f32>> {
+            all.map(|all| all[at * AREA..(at + 1) * AREA].to_vec())
+        }
+        (0..self.estimates.len()).map(move |at| Self {
+            images: self.images[at * AREA..(at + 1) * AREA].to_vec(),
+            upscaled: part(self.upscaled.as_ref(), at),
+            estimates: vec![self.estimates[at]],
+            estimated: self.estimated.as_ref().map(|all| vec![all[at]]),
+            inconsistency: vec![self.inconsistency[at]],
+            spread: part(self.spread.as_ref(), at),
+        })
+    }
+
     fn append(&mut self, mut other: Self) {
         fn join<T>(all: &mut Option<Vec<T>>, more: Option<Vec<T>>) {
             if let Some(more) = more {

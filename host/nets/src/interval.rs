@@ -1,13 +1,20 @@
 //! Calibrated intervals: how far a pixel of an enhanced image may be from the truth.
 //!
 //! A half-width is read from a table, which was made from images that neither training nor judging
-//! used. The table says how large the error was, in 95 % of the pixels that look alike. Pixels look
-//! alike if the same error is expected from what is known without the truth (the contrast around
-//! the pixel, the change by deblurring, estimated blur and noise, ...), in an image that is as busy.
+//! used. There is a table for each method of reconstruction. The table says how large the error was,
+//! in 95 % of the pixels that look alike. Pixels look alike if the same error is expected from what
+//! is known without the truth: the share of the patterns and the noise of the readings, the contrast
+//! around the pixel, the change by deblurring, the estimated blur, and the texture of the image.
+//!
+//! The noise is that of the readings, which the camera knows from its sweeps. The noise that the
+//! estimator finds in the image says nothing about the error of an image from which a method of
+//! reconstruction has removed the noise.
 //!
 //! # Invariant
-//! Networks with other weights than those of the calibration get no interval
-//! (`tests::other_weights_get_no_interval_and_one_line_says_so`).
+//! There is no interval outside of the calibration: other weights, another method, fewer patterns,
+//! more noise, or readings of which nothing is known
+//! (`tests::other_weights_get_no_interval_and_one_line_says_so`,
+//! `tests::other_readings_get_no_interval_and_one_line_says_why`).
 
 mod features;
 mod table;
@@ -23,7 +30,8 @@ use crate::enhance::{Enhanced, Options};
 use crate::estimate::Estimate;
 use crate::weights::{Weights, WeightsError};
 
-pub use table::{LEVEL, LEVELS, Sample, Table, TableError};
+pub(crate) use table::rounded;
+pub use table::{FLOOR, LEVEL, LEVELS, Sample, Table, TableError, edges};
 
 /// A half-width from which the interval says no more than that the pixel is somewhere between dark
 /// and bright: the pixel is the prior's and not the data's.
@@ -45,6 +53,28 @@ pub struct Seen<'a> {
     pub inconsistency: f32,
 }
 
+/// How the readings of an image were taken, and how the image was made of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Readings<'a> {
+    /// The method of reconstruction, with its default settings: its word on the command line, for
+    /// example `tikhonov`.
+    pub method: &'a str,
+    /// The share of the patterns that were measured, 0 to 1.
+    pub share: f32,
+    /// Standard deviation of the noise of a pixel of the plain transform of all patterns; white is 1.
+    /// The noise of one reading (pattern minus complement) divided by 32, the side of the image.
+    pub noise: f32,
+}
+
+/// The readings for which there are intervals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reach {
+    /// The least share of the patterns.
+    pub least_share: f32,
+    /// The most noise of the readings.
+    pub most_noise: f32,
+}
+
 /// A calibration and its origin: what the file of the calibration contains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
@@ -56,12 +86,14 @@ pub struct Calibration {
     pub seed: u64,
     /// The calibration images of each stack.
     pub stacks: Vec<CalibrationStack>,
-    /// The range of blur and noise.
+    /// The conditions of the calibration images, in words.
     pub conditions: String,
     /// Number of enhanced images.
     pub images: usize,
-    /// The table of errors.
-    pub pixels: Table,
+    /// The readings for which there are intervals.
+    pub reach: Reach,
+    /// The table of errors for each method of reconstruction.
+    pub methods: BTreeMap<String, Table>,
     /// The reading of characters.
     pub characters: crate::reading::ReadingScale,
 }
@@ -98,6 +130,42 @@ pub enum NoIntervals {
         /// The network and steps.
         found: String,
     },
+    /// Nothing is known of the readings.
+    #[error(
+        "no intervals: they need the method that made the image, the share of the patterns, and the noise of the readings \
+         as the camera measured it"
+    )]
+    UnknownReadings,
+    /// The image was made by another method, or with other settings than its defaults.
+    #[error("no intervals: they are calibrated for images by {expected}, not by {found}")]
+    OtherReconstruction {
+        /// The calibrated methods.
+        expected: String,
+        /// The method.
+        found: String,
+    },
+    /// Fewer patterns were measured.
+    #[error(
+        "no intervals: they are calibrated for {:.0} to 100 % of the patterns, not for {:.1} %",
+        100.0 * least, 100.0 * found
+    )]
+    OtherShare {
+        /// The share of the patterns.
+        found: f32,
+        /// The least share of the calibration.
+        least: f32,
+    },
+    /// The readings have more noise.
+    #[error(
+        "no intervals: they are calibrated for noise of the readings up to {:.0} % of white, not for {:.1} %",
+        100.0 * most, 100.0 * found
+    )]
+    OtherNoise {
+        /// The noise; white is 1.
+        found: f32,
+        /// The most noise of the calibration.
+        most: f32,
+    },
     /// The images were not enhanced from 32 x 32 pixels.
     #[error("no intervals: they are calibrated for images enhanced from 32 x 32 pixels")]
     OtherSize,
@@ -124,8 +192,9 @@ impl Intervals {
     /// # Errors
     /// [`NoIntervals::Table`] if the calibration is of another program.
     pub fn new(calibration: Calibration) -> Result<Self, NoIntervals> {
-        let pixels = calibration.pixels.checked()?;
-        Ok(Self { calibration: Calibration { pixels, ..calibration } })
+        calibration.methods.values().try_for_each(Table::checked)?;
+        calibration.characters.checked().map_err(|()| TableError::Form)?;
+        Ok(Self { calibration })
     }
 
     /// The shipped calibration.
@@ -162,21 +231,56 @@ impl Intervals {
         }
     }
 
-    /// Half-width of the 95 % interval of each pixel.
-    pub fn half_widths(&self, seen: &Seen<'_>) -> Vec<f32> {
-        self.calibration.pixels.half_widths(seen, LEVEL)
-    }
-
-    /// Half-width of the 95 % interval of each pixel of a stack, (N, 64, 64).
+    /// The table for these readings.
     ///
     /// # Errors
-    /// [`NoIntervals::OtherSize`] if the images were not enhanced from 32 x 32 pixels.
-    pub fn of(&self, enhanced: &Enhanced) -> Result<Vec<f32>, NoIntervals> {
-        Ok(enhanced
-            .seen()
-            .ok_or(NoIntervals::OtherSize)?
-            .flat_map(|s| self.half_widths(&s))
-            .collect())
+    /// [`NoIntervals`] names what the calibration was not made for.
+    pub fn table(&self, readings: &Readings<'_>) -> Result<&Table, NoIntervals> {
+        let Calibration { methods, reach, .. } = &self.calibration;
+        let &Readings { method, share, noise } = readings;
+        let table = methods.get(method).ok_or_else(|| {
+            let words: Vec<&str> = methods.keys().map(String::as_str).collect();
+            NoIntervals::OtherReconstruction {
+                expected: words.join(", "),
+                found: method.to_owned(),
+            }
+        })?;
+        // NaN is outside of every range.
+        if !(reach.least_share..=1.0).contains(&share) {
+            return Err(NoIntervals::OtherShare { found: share, least: reach.least_share });
+        }
+        if !(0.0..=reach.most_noise).contains(&noise) {
+            return Err(NoIntervals::OtherNoise { found: noise, most: reach.most_noise });
+        }
+        Ok(table)
+    }
+
+    /// Half-width of the 95 % interval of each pixel.
+    ///
+    /// # Errors
+    /// [`NoIntervals`] if the calibration was not made for these readings.
+    pub fn half_widths(
+        &self,
+        seen: &Seen<'_>,
+        readings: &Readings<'_>,
+    ) -> Result<Vec<f32>, NoIntervals> {
+        Ok(self.table(readings)?.half_widths(seen, readings, LEVEL))
+    }
+
+    /// Half-width of the 95 % interval of each pixel of a stack, (N, 64, 64), whose images have the
+    /// same kind of readings.
+    ///
+    /// # Errors
+    /// [`NoIntervals`] if the images were not enhanced from 32 x 32 pixels, or the calibration was
+    /// not made for these readings.
+    pub fn of(
+        &self,
+        enhanced: &Enhanced,
+        readings: &Readings<'_>,
+    ) -> Result<Vec<f32>, NoIntervals> {
+        let table = self.table(readings)?;
+        let seen = enhanced.seen().ok_or(NoIntervals::OtherSize)?;
+        Ok(seen.flat_map(|seen| table.half_widths(&seen, readings, LEVEL)).collect())
     }
 }
 
@@ -221,6 +325,7 @@ impl Networks {
             return other("a result that is not held against the readings".to_owned());
         }
         let intervals = Intervals::shipped()?;
+        // The reconstruction's network is not one of these: it is named by `Readings::method`.
         for network in NETWORKS {
             let weights = self.weights(network)?;
             intervals.expect(network, &weights)?;

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use nirspi_recon::Side;
+use nirspi_recon::reconstruct::MethodSettings;
 use nirspi_recon::reconstruct::prior::{Network, Seen, SharedNetwork};
 
 use crate::cpu;
@@ -20,11 +21,11 @@ struct OnCpu(cpu::Prior);
 /// The shipped network, which is read when it is first used.
 struct Shipped(OnceLock<Result<cpu::Prior, String>>);
 
-/// The shipped network, for `MethodSettings::network`. Every caller shares one; its weights are
-/// read when the first image is made.
+/// Settings with which every method of `nirspi_recon` can be prepared, `prior` among them: the
+/// defaults, and the [shipped](shipped) network.
 ///
 /// ```
-/// use nirspi_recon::reconstruct::{Method, MethodSettings};
+/// use nirspi_recon::reconstruct::Method;
 /// use nirspi_recon::{Measurements, Order, Rows, Side};
 ///
 /// let side = Side::new(32)?;
@@ -32,11 +33,19 @@ struct Shipped(OnceLock<Result<cpu::Prior, String>>);
 /// nirspi_recon::fwht(&mut scene)?;
 /// let all = Measurements::from_differential(&Rows::natural(side), &scene)?;
 /// let part = all.take(Some(&Order::ZigZag), 0.2)?;
-/// let network = Some(nirspi_nets::prior::shipped());
-/// let method = Method::PRIOR.prepare(&MethodSettings { network, ..MethodSettings::default() })?;
-/// println!("{}", method.reconstruct(&part)?.report);
+/// for method in Method::ALL {
+///     let ready = method.prepare(&nirspi_nets::prior::settings())?;
+///     println!("{}", ready.reconstruct(&part)?.report);
+/// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[must_use]
+pub fn settings() -> MethodSettings {
+    MethodSettings { network: Some(shipped()), ..MethodSettings::default() }
+}
+
+/// The shipped network, for `MethodSettings::network`. Every caller shares one; its weights are
+/// read when the first image is made.
 #[must_use]
 pub fn shipped() -> SharedNetwork {
     static SHARED: OnceLock<SharedNetwork> = OnceLock::new();

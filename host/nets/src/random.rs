@@ -1,6 +1,6 @@
 //! Random numbers that depend on a seed and on an image's index, and never on the image's batch.
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -19,6 +19,11 @@ impl Noise {
     /// Draws one number.
     pub(crate) fn draw(&mut self) -> f32 {
         StandardNormal.sample(&mut self.0)
+    }
+
+    /// Draws one number, even between 0 and 1.
+    pub(crate) fn uniform(&mut self) -> f32 {
+        self.0.random()
     }
 }
 

@@ -1,19 +1,19 @@
-"""Builds train.npz and val.npz (64 x 64, 8 bit, by kind) and split.json, which names the groups that training never sees.
+"""Builds train.npz and val.npz (64 x 64, 8 bit, by kind). ../weights/held_out.json names the groups that training never sees.
 
 usage: characters.py CHARS74K_FOLDER FONTS_FOLDER NATURAL_FILE OUT_FOLDER
 
-CHARS74K_FOLDER holds {fnt,hnd,img}_train.npz; NATURAL_FILE is bsds_train.npz, of which scenes 1, 4 and 8 of each ten are held out;
+CHARS74K_FOLDER holds {fnt,hnd,img}_train.npz; NATURAL_FILE is bsds_train.npz;
 FONTS_FOLDER a folder of .woff2, .ttf or .otf files for each family
 (the shipped weights: 829 families of @fontsource from npm, under the OFL). Characters keep Chars74K's own form: bright on dark, centred,
 48 pixels along their longer side. Everything is seeded.
 """
 import glob
 import io
-import json
 import os
 import sys
 
 import numpy as np
+import split
 from fontTools.ttLib import TTFont
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 from scipy.ndimage import gaussian_filter
@@ -199,24 +199,12 @@ def natural(scenes, count):
 
 
 def main(chars74k, fonts, natural_file, out):
-    fnt, hnd, img = (np.load(f"{chars74k}/{kind}_train.npz") for kind in ("fnt", "hnd", "img"))
-    families = np.sort(rng.permutation(np.unique(fnt["family"]))[:20])
-    writers = np.sort(rng.permutation(np.unique(hnd["writer"]))[:5])
-    photos = np.sort(rng.permutation(len(img["x"]))[:200])
-    held = {
-        "fnt": np.isin(fnt["family"], families),
-        "hnd": np.isin(hnd["writer"], writers),
-        "img": np.isin(np.arange(len(img["x"])), photos),
-    }
+    stacks = split.characters(chars74k)
+    sources = {kind: file for kind, (file, _) in stacks.items()}
+    held = {kind: mask for kind, (_, mask) in stacks.items()}
     os.makedirs(out, exist_ok=True)
-    names = [str(img["fname"][k]) for k in photos]
-    split = dict(seed=SEED, fnt_families=families.tolist(), hnd_writers=writers.tolist(), img_files=names)
     scenes = np.load(natural_file)["x"]
-    hidden = np.isin(np.arange(len(scenes)) % 10, (1, 4, 8))
-    split["natural"] = np.flatnonzero(hidden).tolist()
-    with open(f"{out}/split.json", "w") as file:
-        json.dump(split, file)
-    sources = dict(fnt=fnt, hnd=hnd, img=img)
+    hidden = split.natural(len(scenes))
     val = {kind: source["x"][held[kind]] for kind, source in sources.items()}
     val |= {f"{kind}_label": source["label"][held[kind]] for kind, source in sources.items()}
     # The middle of each held-out scene.

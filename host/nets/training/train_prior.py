@@ -3,7 +3,7 @@
 usage: train_prior.py DATA OUT_FOLDER MINUTES [--batch 16] [--seed 13] [--resume]
 
 DATA holds natural/bsds_train.npz, chars74k/{fnt,hnd,img}_train.npz as ../weights/held_out.json splits them, and fonts/*.ttf, *.otf.
-Every tenth natural scene (index 4, 14, 24, ...) is held out. The learning rate follows the clock; the weights written are a running
+Every tenth natural scene (index 4, 14, 24, ...: natural_of_prior) is held out. The learning rate follows the clock; the weights written are a running
 mean (EMA).
 """
 import argparse
@@ -12,9 +12,9 @@ import json
 import math
 import os
 import time
-from pathlib import Path
 
 import numpy as np
+import split
 import torch
 import torch.nn.functional as F
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
@@ -23,21 +23,11 @@ from safetensors.torch import save_file
 from scipy.ndimage import gaussian_filter
 
 PAGE = (160, 240)
-HELD_OUT = json.loads((Path(__file__).parent / "../weights/held_out.json").read_text())
-
-
-def held_out(index):
-    return index % 10 == 4
 
 
 def characters(data):
     """Chars74K without its held-out families, writers and photographs."""
-    stacks = []
-    for kind, group in (("fnt", "family"), ("hnd", "writer"), ("img", None)):
-        file = np.load(f"{data}/chars74k/{kind}_train.npz")
-        groups = file[group] if group else np.arange(len(file["x"]))
-        stacks.append(file["x"][~np.isin(groups, HELD_OUT[f"{kind}_train"])])
-    return stacks
+    return [file["x"][~held] for file, held in split.characters(f"{data}/chars74k").values()]
 
 
 class Pages:
@@ -111,7 +101,7 @@ class Scenes:
     def __init__(self, data, seed):
         self.rng = rng = np.random.default_rng(seed)
         natural = np.load(f"{data}/natural/bsds_train.npz")["x"]
-        keep = np.array([not held_out(i) for i in range(len(natural))])
+        keep = ~split.natural(len(natural), "natural_of_prior")
         self.natural, self.test, self.stacks = natural[keep], natural[~keep], characters(data)
         pages = Pages(data, self.natural, self.stacks, rng)
         self.pages = np.stack([pages.page() for _ in range(400)])

@@ -29,6 +29,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
 use thiserror::Error;
 
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
@@ -81,7 +82,7 @@ pub enum ChainError {
 }
 
 /// The receiver's settings.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ChainSettings {
     /// ADC clock period, in ns: [`crate::instrument::SAMPLE_NS`].
     pub sample_ns: f64,

@@ -19,9 +19,9 @@
 
 use crate::{CameraModel, LEDS, SIDE};
 use serde::Serialize;
-use thiserror::Error;
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::fmt::{self, Display};
+use thiserror::Error;
 
 /// Allowed irradiance of the eye for 1000 s and longer, in W/m^2.
 pub const LONG_EXPOSURE_LIMIT_W_PER_M2: f64 = 100.0;

@@ -11,6 +11,7 @@ use nirspi::archive::{
     ArchiveError, ArchiveOptions, Grid, GridAxes, ImageFiles, RowReader, Shard, Work, archive,
     archive_part, write_file,
 };
+use nirspi::exposure::Length;
 use nirspi::reconstruct::Solver;
 use nirspi::virtual_camera::{CameraModel, read_camera_model};
 use nirspi_recon::Sampling;
@@ -70,7 +71,7 @@ impl Axes {
             orders: self.orders.iter().map(|name| named(name)).collect::<PyResult<_>>()?,
             samplings: self.samplings.iter().map(share).collect::<PyResult<_>>()?,
             seeds: self.seeds,
-            frames: self.frames,
+            length: Length::Frames(self.frames, None),
         })
     }
 }

@@ -10,6 +10,7 @@ mod arrays;
 mod camera;
 mod errors;
 mod loaded;
+mod made;
 mod measurement;
 mod metrics;
 mod networks;

@@ -2,7 +2,7 @@
 
 use crate::arrays::{array, fill, room};
 use crate::errors::of_source;
-use crate::measurement::{FlatField, Lost, Options, lost, numbers};
+use crate::measurement::{FlatField, Lost, Options, lost, numbers, warnings};
 use crate::work::{heavy, long};
 use nirspi::source::{Index, Several, Source};
 use nirspi_recon::Measurements;
@@ -105,9 +105,12 @@ impl Loaded {
         let references: Option<Vec<&[f32]>> =
             sources.iter().map(|source| Some(source.reference.as_ref()?.pixels())).collect();
         let mut notes: Vec<String> = Vec::new();
-        for note in sources.iter().flat_map(|source| &source.notes) {
-            if !notes.contains(note) {
-                notes.push(note.clone());
+        for source in &sources {
+            let said = warnings(&source.outliers, source.warnings.iter().cloned());
+            for note in source.notes.iter().cloned().chain(said) {
+                if !notes.contains(&note) {
+                    notes.push(note);
+                }
             }
         }
         let flat_field = first.flat_field.clone();

@@ -6,8 +6,9 @@ use crate::orders::named;
 use crate::work::heavy;
 use nirspi::calibration;
 use nirspi::files::measurement::{Form, Selection};
-use nirspi::source::{Index, Part, SourceOptions};
-use nirspi_recon::{Dropout, Image, Measurements, Rows, Side};
+use nirspi::source::{Index, OutlierReport, Part, SourceOptions};
+use nirspi_recon::law::{self, Doubt};
+use nirspi_recon::{Dropout, Image, Outlier, Rows, Side};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::str::FromStr;
@@ -127,35 +128,19 @@ pub fn readings<'py>(
     let form = word::<Form>("readings", form)?;
     let rows = rows(side(n)?, &shown)?;
     let y = slice(&y)?;
-    let (measured, dropouts, notes) = heavy(py, || {
-        let mut notes = Vec::new();
-        let (mut measured, mut dropouts) = (None, Vec::new());
-        match form {
-            Form::Pairs => {
-                let (found, lost) = Measurements::from_pairs(&rows, y).map_err(refusal)?;
-                (measured, dropouts) = (Some(found), lost);
-            }
-            Form::Halves => {
-                let (plus, minus) = y.split_at(y.len() / 2);
-                let pairs: Vec<f64> = plus.iter().zip(minus).flat_map(|(&p, &m)| [p, m]).collect();
-                let (found, lost) = Measurements::from_pairs(&rows, &pairs).map_err(refusal)?;
-                (measured, dropouts) = (Some(found), lost);
-            }
-            Form::Single => {
-                let mut found = Measurements::from_single(&rows, y).map_err(refusal)?;
-                if let Some(level) = found.remove_dark_level() {
-                    notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
-                }
-                measured = Some(found);
-            }
-            Form::Differences => {}
-        }
-        let measured = match measured {
-            Some(measured) => measured,
-            None => Measurements::from_differential(&rows, y).map_err(refusal)?,
-        };
-        Ok((measured, dropouts, notes))
-    })?;
-    let rows = array(py, numbers(measured.rows()));
-    Ok((rows, array(py, measured.into_values()), lost(dropouts), notes))
+    let read = heavy(py, || law::read(&rows, y, form.into()).map_err(refusal))?;
+    let mut notes: Vec<String> = read
+        .dark_level
+        .map(|level| format!("a dark level of {level:.4} was found in `y` and removed"))
+        .into_iter()
+        .collect();
+    notes.extend(warnings(&read.outliers, read.doubts.iter().map(Doubt::to_string)));
+    let rows = array(py, numbers(read.measurements.rows()));
+    Ok((rows, array(py, read.measurements.into_values()), lost(read.dropouts), notes))
+}
+
+/// Outliers and what contradicts the readings, in words.
+pub(crate) fn warnings(outliers: &[Outlier], doubts: impl Iterator<Item = String>) -> Vec<String> {
+    let outliers = outliers.iter().map(|outlier| OutlierReport::of(outlier).to_string());
+    outliers.chain(doubts.map(|doubt| format!("warning: {doubt}"))).collect()
 }

@@ -2,8 +2,10 @@
 
 use crate::arrays::{slice, whole};
 use crate::errors::refused;
+use crate::made::made;
 use crate::work::heavy;
 use nirspi::picture::{Panel, Sheet, SideBySide, Unit};
+use nirspi::provenance::{Origin, Taken};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -35,6 +37,7 @@ pub fn picture<'py>(
             values.len()
         )));
     }
+    let provenance = Taken::without_camera(Origin::Unknown).made(&made(py)?);
     let panel = Panel {
         width,
         height,
@@ -42,7 +45,7 @@ pub fn picture<'py>(
         warnings,
         ..Panel::square(title, 1, values, unit(unit_name)?)
     };
-    let png = heavy(py, || Ok(SideBySide::from(panel).png()))?;
+    let png = heavy(py, || Ok(SideBySide::from(panel).png(&provenance)))?;
     Ok(PyBytes::new(py, &png))
 }
 
@@ -58,7 +61,8 @@ pub fn sheet<'py>(
     let values = slice(&values)?;
     whole("the stack", values.len(), n * n)?;
     let unit = unit(unit_name)?;
+    let provenance = Taken::without_camera(Origin::Unknown).made(&made(py)?);
     let png =
-        heavy(py, || Ok(Sheet::new(header, n, values.chunks_exact(n * n).collect(), unit).png()))?;
+        heavy(py, || Ok(Sheet::new(header, n, values.chunks_exact(n * n).collect(), unit).png(&provenance)))?;
     Ok(PyBytes::new(py, &png))
 }

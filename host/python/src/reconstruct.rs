@@ -50,8 +50,8 @@ pub(crate) struct Options<'py> {
     strength: Option<f64>,
     as_printed: bool,
     non_negative: bool,
-    keep: Option<String>,
     warm_start: bool,
+    dark: bool,
     device: String,
 }
 
@@ -128,7 +128,6 @@ impl Options<'_> {
             as_printed: self.as_printed,
             non_negative: self.non_negative,
             strength: self.strength.map_or(default.strength, Strength::Fixed),
-            completion: self.keep.as_ref().map(|keep| keep.parse().map_err(refusal)).transpose()?,
             network: Some(nirspi_nets::prior::shipped()),
             backend: backend(&self.device)?.0,
         })
@@ -400,6 +399,7 @@ pub fn reconstruct_matrix<'py>(
         strength: options.strength,
         sparsity: options.sparsity,
         non_negative: settings.non_negative,
+        dark: options.dark,
         ..MatrixSettings::new(how)
     };
     let (side, weights, y) = (side(n)?, slice(&weights)?, slice(&y)?);
@@ -429,9 +429,10 @@ fn of_matrix(
             "method": method.argument(), "used": matrix.patterns(), "order": "as given", "warm": false,
             "rank": matrix.rank(), "unseen_pixels": matrix.unseen_pixels(),
             "strength": made.strength, "sparsity": atoms, "stop": why,
+            "dark_level": settings.dark.then_some(made.dark.value()), "note": made.dark.note(),
             "relative_residual": made.residual,
-            "words": format!("{}, {} patterns of one's own, relative residual {:.3}",
-                             method.name(), matrix.patterns(), made.residual),
+            "words": format!("{}, {} patterns of one's own, dark level {:.4}, relative residual {:.3}",
+                             method.name(), matrix.patterns(), made.dark.value(), made.residual),
         });
         reports.push(report.to_string());
     }

@@ -1,5 +1,6 @@
 //! Recordings: every frame with its times, and what else the file says.
 
+use crate::made::made;
 use crate::arrays::array;
 use crate::errors::{of_file, of_recording, of_source, refusal, refused};
 use crate::work::long;
@@ -100,7 +101,8 @@ pub fn read_recording<'py>(
 #[pyfunction]
 pub fn export_zarr(py: Python<'_>, path: PathBuf, out: PathBuf, keep_leak: bool) -> PyResult<()> {
     let options = ExportOptions { keep_leak, ..ExportOptions::default() };
-    long(py, |_| match export(&path, &out, Format::Zarr, &options) {
+    let made = made(py)?;
+    long(py, |_| match export(&path, &out, Format::Zarr, &options, &made) {
         Ok(_) => Ok(()),
         Err(ExportError::File(error)) => Err(of_file(error)),
         Err(ExportError::Recording(error)) => Err(of_recording(error)),

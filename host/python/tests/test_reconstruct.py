@@ -138,7 +138,7 @@ def test_the_order_chooses_the_patterns():
 
 def test_options_of_omp():
     m = measured()
-    fixed = ns.reconstruct(m, method="omp", sparsity=20, keep="sparse", basis="haar")
+    fixed = ns.reconstruct(m, method="omp", sparsity=20, basis="haar")
     assert fixed.report["omp"]["sparsity"] == 20 and fixed.report["omp"]["basis"] == "haar"
     light = ns.reconstruct(m, method="omp", basis="pixel", non_negative=True, sampling=0.3)
     assert light.min() > -1e-5  # rounding of the transform

@@ -47,7 +47,7 @@ fn transform(pixels: &mut [f64]) -> Result<(), ReconstructError> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut methods: Vec<Box<dyn Reconstruct>> = vec![Box::new(Projections { rounds: 50 })];
-    for method in Method::ALL {
+    for method in Method::ALL.iter().filter(|method| !method.needs_network()) {
         methods.push(method.prepare(&MethodSettings::default())?);
     }
     let (scene, part) = points(Side::INSTRUMENT)?;

@@ -155,7 +155,7 @@ fn wing(data: &Path) -> Result<Scene> {
     let path = data.join("spi/opar_ala1.npz");
     let rows = Rows::new(Side::new(64)?, array::<i32>(&path, "h_row")?)?;
     let y: Vec<f64> = array::<f32>(&path, "y")?.into_iter().map(f64::from).collect();
-    Ok(Scene { name: "wing (real, 64)", all: Measurements::from_pairs(&rows, &y)?.0 })
+    Ok(Scene { name: "wing (real, 64)", all: Measurements::from_pairs(&rows, &y)?.measurements })
 }
 
 fn car(data: &Path, detector: usize) -> Result<Scene> {

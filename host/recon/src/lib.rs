@@ -6,7 +6,8 @@
 //! | module | input | output |
 //! |---|---|---|
 //! | [`leak`] | readings with light of earlier slots | corrected readings |
-//! | [`Measurements`] | readings or differences | one measurement for each Hadamard row, without drop-outs |
+//! | [`law`] | readings or differences | one measurement for each Hadamard row, without drop-outs and outliers, and what contradicts the readings |
+//! | [`Measurements`] | the same, known to be sound | one measurement for each Hadamard row |
 //! | [`Rows`] | numbers of Hadamard rows | checked rows |
 //! | [`order`] | the name of an order | rows |
 //! | [`fwht`](mod@fwht) | an image | its Hadamard measurements, and back |
@@ -20,9 +21,9 @@
 
 pub mod backend;
 pub mod basis;
-mod dropout;
 pub mod fwht;
 mod image;
+pub mod law;
 pub mod leak;
 mod measurements;
 pub mod metrics;
@@ -38,9 +39,9 @@ pub mod words;
 
 pub use backend::{Backend, ParseBackendError};
 pub use basis::{Basis, ParseBasisError};
-pub use dropout::Dropout;
 pub use fwht::{FwhtLengthError, fwht};
 pub use image::Image;
+pub use law::{Dropout, Outlier};
 pub use leak::{Leak, LeakError, Sweep};
 pub use measurements::{MeasurementError, Measurements, ShorterSweep};
 pub use order::{NamedOrder, Order, ParseOrderError};

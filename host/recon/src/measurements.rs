@@ -8,16 +8,18 @@ mod shorter_sweep;
 
 pub use shorter_sweep::ShorterSweep;
 
-use crate::dropout::{self, Dropout};
+use crate::law::{self, Form, Reading};
 use crate::{Order, Rows, RowsError, Side, order};
 use thiserror::Error;
 
 /// Signed measurements `value[k] = sum over pixels of H[row[k], p] * x[p]`, in the order of
-/// measurement. Values are finite. Rows that were not measured, or were left out, are absent.
+/// measurement. Values are finite. Rows that were not measured, or were left out, are absent. The
+/// noise of a value is known if the camera measured it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurements {
     rows: Rows,
     values: Vec<f64>,
+    noise: Option<f64>,
 }
 
 /// What is wrong with a set of measurements. The caller adds the name of the file.
@@ -34,8 +36,10 @@ pub enum MeasurementError {
         /// The length of the other lists.
         expected: usize,
     },
-    /// Drop-outs left no measurement.
-    #[error("no measurement is left, expected at least one that no drop-out touches")]
+    /// Drop-outs and outliers left no measurement.
+    #[error(
+        "no measurement is left, expected at least one that no drop-out touches and that light can have given"
+    )]
     Empty,
     /// A value is NaN or infinite.
     #[error("{field}[{index}] is {found}, expected a finite number")]
@@ -53,6 +57,12 @@ pub enum MeasurementError {
         /// The share that was requested.
         found: f64,
     },
+    /// The noise of a value is negative.
+    #[error("a noise of {found}, expected a standard deviation of 0 or more")]
+    Noise {
+        /// The noise that was given.
+        found: f64,
+    },
     /// The rows, or the rows of an order, are wrong.
     #[error(transparent)]
     Rows(#[from] RowsError),
@@ -68,41 +78,17 @@ impl Measurements {
     pub fn from_differential(rows: &Rows, d: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("d", d.len(), rows.len())?;
         expect_finite("d", d)?;
-        Ok(Self { rows: rows.clone(), values: d.to_vec() })
+        Ok(Self { rows: rows.clone(), values: d.to_vec(), noise: None })
     }
 
     /// Measurements from raw readings in time order, each pattern followed by its complement:
     /// `y = [+, -, +, -, ...]`, `2 * rows.len()` readings. A constant dark level cancels in each
-    /// difference.
-    ///
-    /// The result leaves out the pairs that a [`Dropout`] touched, and the list names the
-    /// drop-outs.
+    /// difference. As [`law::read`] of [`Form::Pairs`].
     ///
     /// # Errors
-    /// [`MeasurementError`] if there are not two readings for each row, or a reading is not finite;
-    /// [`Empty`](MeasurementError::Empty) if no pair is left.
-    pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<(Self, Vec<Dropout>), MeasurementError> {
-        expect_length("y", y.len(), 2 * rows.len())?;
-        expect_finite("y", y)?;
-        let dropouts = dropout::find(rows, y);
-        let mut lost = vec![false; rows.len()];
-        for dropout in &dropouts {
-            lost[dropout.pairs()].fill(true);
-        }
-        let (mut kept, mut values) = (Vec::new(), Vec::new());
-        for ((&row, pair), _) in
-            rows.iter().zip(y.as_chunks::<2>().0).zip(&lost).filter(|(_, lost)| !**lost)
-        {
-            kept.push(row);
-            values.push(pair[0] - pair[1]);
-        }
-        if kept.is_empty() {
-            return Err(MeasurementError::Empty);
-        }
-        expect_finite("d", &values)?; // readings near the end of f64's range may differ by more
-        let rows =
-            if dropouts.is_empty() { rows.clone() } else { Rows::trusted(rows.side(), kept) };
-        Ok((Self { rows, values }, dropouts))
+    /// As [`law::read`].
+    pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<Reading, MeasurementError> {
+        law::read(rows, y, Form::Pairs.into())
     }
 
     /// Measurements from readings of the positive patterns alone (light where `H` is +1):
@@ -124,7 +110,7 @@ impl Measurements {
         };
         let values: Vec<f64> = y.iter().map(|y| 2.0 * y - all_ones).collect();
         expect_finite("d", &values)?;
-        Ok(Self { rows: rows.clone(), values })
+        Ok(Self { rows: rows.clone(), values, noise: None })
     }
 
     /// Removes the effect of a dark level in every reading (ambient light, an ADC's offset) from
@@ -165,13 +151,41 @@ impl Measurements {
 
     /// Measurements that are known to be one finite value for each row.
     pub(crate) fn trusted(rows: Rows, values: Vec<f64>) -> Self {
-        Self { rows, values }
+        Self { rows, values, noise: None }
+    }
+
+    /// Replaces the value at a position by a finite one.
+    pub(crate) fn replace(&mut self, position: usize, value: f64) {
+        self.values[position] = value;
     }
 
     /// The measurements at these positions, in that order.
     pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();
-        Self { rows: Rows::trusted(self.side(), rows), values }
+        Self { rows: Rows::trusted(self.side(), rows), values, noise: self.noise }
+    }
+
+    /// These measurements with the standard deviation of the noise of one value, in the values'
+    /// units: what the camera knows from repeated sweeps. The noise is the same for all values. Every
+    /// method weights each reading by it; without it the methods estimate the noise
+    /// ([`estimated_noise`](crate::reconstruct::estimated_noise)).
+    ///
+    /// # Errors
+    /// [`MeasurementError::NotFinite`] for NaN or infinity; [`MeasurementError::Noise`] below 0.
+    pub fn with_noise(mut self, noise: f64) -> Result<Self, MeasurementError> {
+        expect_finite("noise", &[noise])?;
+        if noise < 0.0 {
+            return Err(MeasurementError::Noise { found: noise });
+        }
+        self.noise = Some(noise);
+        Ok(self)
+    }
+
+    /// Standard deviation of the noise of one value, in the values' units, if it was
+    /// [measured](Self::with_noise).
+    #[must_use]
+    pub fn noise(&self) -> Option<f64> {
+        self.noise
     }
 
     /// Side of the image that was measured.
@@ -199,7 +213,7 @@ impl Measurements {
     }
 }
 
-fn expect_length(
+pub(crate) fn expect_length(
     field: &'static str,
     found: usize,
     expected: usize,
@@ -211,7 +225,7 @@ fn expect_length(
     }
 }
 
-fn expect_finite(field: &'static str, values: &[f64]) -> Result<(), MeasurementError> {
+pub(crate) fn expect_finite(field: &'static str, values: &[f64]) -> Result<(), MeasurementError> {
     // Without an early end, so that the compiler uses vectors.
     if values.iter().fold(true, |finite, value| finite & value.is_finite()) {
         return Ok(());

@@ -21,7 +21,7 @@
 //! | `cake-cutting` | ascending number of connected blocks of the pattern, `(i + 1)(j + 1)` | W.-K. Yu, *Super sub-Nyquist single-pixel imaging by means of cake-cutting Hadamard basis sort*, 2019 |
 //! | `russian-dolls` | complete `2 x 2`, then `4 x 4`, ... bases, one inside the other; what each adds comes as the quarter finer across (`j` new), the quarter finer down (its transposes, in the same order), the quarter finer both ways; within a quarter ascending number of blocks (which of the two half-finer quarters comes first is our choice) | M.-J. Sun et al., *A Russian Dolls ordering of the Hadamard basis for compressive single-pixel imaging*, 2017 |
 //! | `total-variation` | ascending total variation of the pattern: the sum of the lengths of its forward-difference gradients (isotropic, which the paper's text was not at hand to confirm), `2 n (i + j) - (4 - 2 sqrt 2) i j` | X. Yu et al., *Super sub-Nyquist single-pixel imaging by total variation ascending ordering of the Hadamard basis*, 2020 |
-//! | `random:SEED` | Fisher-Yates from the last entry down, driven by `rand_pcg::Pcg64` | R. Durstenfeld, *Algorithm 235: random permutation*, 1964; M. E. O'Neill, *PCG*, 2014 |
+//! | `random:SEED` | Fisher-Yates from the last entry down, driven by `rand_pcg::Pcg64`; then the all-ones pattern moves to the front, so that every part of a sweep holds it | R. Durstenfeld, *Algorithm 235: random permutation*, 1964; M. E. O'Neill, *PCG*, 2014 |
 //! | `walsh-2d` | the `(i, j)` grid row by row: `p(i) n + p(j)`, `p(s)` being the row of 1-D sequency `s` | SPyRiT 3.1.1, `HadamSplit2d(n)` without an order |
 //! | `deepinv:sequency` | ours, transposed | deepinv 0.5.0, `SinglePixelCamera(ordering="sequency")` |
 //! | `deepinv:cake_cutting` | ascending `(i + 1)(j + 1)`; its ties are not defined | the same, `"cake_cutting"` |
@@ -68,7 +68,7 @@ pub enum Order {
     DeepinvZigZag,
     /// deepinv's `xy`.
     DeepinvXy,
-    /// A shuffle that its seed determines, today and in every later version.
+    /// The all-ones pattern, then all others in a shuffle that the seed determines.
     Random(u64),
     /// The user's own: entry k is the natural row shown k-th.
     Table(Vec<u32>),
@@ -199,7 +199,7 @@ impl Order {
     /// [`RowsError`] if this is a [`Table`](Self::Table) that is no permutation of `0..side^2`.
     pub fn rows(&self, side: Side) -> Result<Rows, RowsError> {
         let rows = match self {
-            Self::Random(seed) => shuffled(side.area() as u32, *seed),
+            Self::Random(seed) => all_ones_first(shuffled(side.area() as u32, *seed)),
             Self::Table(table) => {
                 return Rows::new(side, table.iter().copied()).and_then(Rows::whole);
             }
@@ -350,7 +350,8 @@ fn total_variation(side: Side) -> Vec<u32> {
 /// Stream of the generator behind [`Order::Random`]: any constant would do, but never another one.
 const RANDOM_STREAM: u128 = 0x6e69_7273_7069;
 
-fn shuffled(count: u32, seed: u64) -> Vec<u32> {
+/// Numbers in an order that the seed determines.
+pub(crate) fn shuffled(count: u32, seed: u64) -> Vec<u32> {
     let mut generator = Pcg64::new(u128::from(seed), RANDOM_STREAM);
     // Written out, not taken from a library: a library may change how it draws, recordings may not.
     let mut below = |bound: u64| {
@@ -366,6 +367,14 @@ fn shuffled(count: u32, seed: u64) -> Vec<u32> {
     for last in (1..rows.len()).rev() {
         rows.swap(last, below(last as u64 + 1));
     }
+    rows
+}
+
+/// The rows with the all-ones pattern in front. The mean of an image is in this pattern alone: a part of
+/// a sweep without it has none.
+fn all_ones_first(mut rows: Vec<u32>) -> Vec<u32> {
+    let all_ones = rows.iter().position(|&row| row == 0).unwrap_or(0);
+    rows[..=all_ones].rotate_right(1);
     rows
 }
 

@@ -1,9 +1,10 @@
 //! From measurements to an image.
 //!
 //! # Invariant
-//! By default the image has exactly the measured Hadamard coefficients
-//! (`tests::what_was_measured_is_kept_and_any_side_and_share_gives_an_image`). Only the rows that
-//! were not measured are filled in: by zeros ([`hadamard`]), or by the prediction of a sparse
+//! A measured Hadamard coefficient of the image is the weighted mean of reading and prediction, and
+//! differs from the reading by at most [`WITHIN`] times the reading's noise
+//! (`tests::what_was_measured_is_kept_within_its_noise_and_any_side_and_share_gives_an_image`). Rows
+//! that were not measured are filled in: by zeros ([`hadamard`]), or by the prediction of a sparse
 //! representation ([`omp()`]), scaled by how well it predicted held-back rows.
 //!
 //! # Why OMP is not used bare
@@ -12,7 +13,8 @@
 //! huge coefficients. The baseline to beat is zero filling of a low-sequency order.
 //! [`OmpSettings::default`] adds to Algorithm 1, most important first:
 //!
-//! 1. **Completion**: the measured coefficients stay; the representation fills only the others.
+//! 1. **Weights**: a measured coefficient keeps its reading as far as the reading's noise is below
+//!    the error of the prediction (`weight.rs`); the representation fills the others.
 //! 2. **A prior**: coefficients are expected to fall as one over frequency, the amplitude spectrum
 //!    of natural images (D. J. Field, *Relations between the statistics of natural images and the
 //!    response properties of cortical cells*, 1987), and measurements to have the noise estimated
@@ -22,8 +24,11 @@
 //!
 #![doc = include_str!("reconstruct/study.md")]
 
+mod explanation;
+mod held_back;
 mod method;
 mod methods;
+mod noise;
 mod own_atoms;
 mod own_matrix;
 pub mod prior;
@@ -33,22 +38,29 @@ mod regularised;
 mod report;
 mod selection;
 mod video;
+mod weight;
 
+pub use explanation::{Explanation, explanation};
+pub use held_back::HeldBack;
 pub use method::{Method, MethodSettings, OwnAtoms, ParseMethodError, Reconstruct, Setting};
 pub use methods::hadamard;
+pub use noise::estimated_noise;
 pub use own_atoms::omp_over;
-pub use own_matrix::{MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix};
+pub use own_matrix::{
+    DarkLevel, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix,
+};
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings, believed_frame, fused_frame};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};
 pub use video::{VideoFrame, omp_video};
+pub use weight::WITHIN;
 
 use crate::basis::{Basis, Transform};
 use crate::omp::sampled::{Prior, SampledHadamard, visible_energy};
 use crate::omp::{Backend, Limits, OmpError, Stop};
 use crate::{Image, Measurements, Order, Rows, Side, fwht};
+use noise::Statistics;
 use pursuit::{Found, How};
-use std::str::FromStr;
 use thiserror::Error;
 
 /// The order for taking a part of recorded measurements, unless the user names another one: the
@@ -94,52 +106,11 @@ impl Sparsity {
     }
 }
 
-/// Whether measured rows keep their values or take those of the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Completion {
-    /// They keep their measured values; only the others are predicted.
-    Measured,
-    /// All rows take the values of the fit: the image is exactly sparse, and its noise is that of
-    /// the fit.
-    Sparse,
-}
-
-impl Completion {
-    /// Every completion.
-    pub const ALL: [Self; 2] = [Self::Measured, Self::Sparse];
-
-    /// The completion's name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Measured => "measured",
-            Self::Sparse => "sparse",
-        }
-    }
-}
-
-/// Error: no completion has this name.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("unknown completion {found:?}, expected {}", Completion::ALL.map(Completion::name).join(" or "))]
-pub struct ParseCompletionError {
-    /// The name that was given.
-    pub found: String,
-}
-
-impl FromStr for Completion {
-    type Err = ParseCompletionError;
-
-    fn from_str(name: &str) -> Result<Self, ParseCompletionError> {
-        let named = Self::ALL.into_iter().find(|completion| completion.name() == name);
-        named.ok_or_else(|| ParseCompletionError { found: name.to_owned() })
-    }
-}
-
 /// The noise of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoiseLevel {
-    /// Estimated: the median magnitude of the quarter of the measured rows with the highest
-    /// sequency, which contain least of a scene.
+    /// That of the [measurements](Measurements::noise); estimated if they have none
+    /// ([`estimated_noise`]).
     Estimated,
     /// Standard deviation in the measurements' own units.
     Known(f64),
@@ -155,14 +126,16 @@ pub struct OmpSettings {
     /// Norm of the residual, relative to the measurements' norm, at which the pursuit stops.
     pub residual: f64,
     /// Power of the frequency with which coefficients are expected to fall; 0 expects all to be
-    /// alike.
-    pub falloff: f64,
+    /// alike. `None`: the power that the measurements themselves make likely, which costs a pursuit
+    /// more than it gains where nearly all light is scattered (`scatter_tests.rs`).
+    pub falloff: Option<f64>,
     /// Noise of the measurements.
     pub noise: NoiseLevel,
     /// Least share of an atom's energy that the measured rows must see for the atom to be chosen.
     pub visibility: f64,
-    /// Whether measured rows keep their values or take those of the fit.
-    pub completion: Completion,
+    /// Whether the image is exactly the sparse fit. Otherwise measured rows are weighted means of
+    /// reading and fit.
+    pub exactly_sparse: bool,
     /// The backend of the pursuits. One image takes a few pursuits over different dictionaries, so
     /// [`Backend::Auto`] is the processor.
     pub backend: Backend,
@@ -190,10 +163,10 @@ impl OmpSettings {
             basis,
             sparsity: Sparsity::Fixed(sparsity),
             residual: 0.0,
-            falloff: 0.0,
+            falloff: Some(0.0),
             noise: NoiseLevel::Known(0.0),
             visibility: Self::LEAST_VISIBILITY,
-            completion: Completion::Sparse,
+            exactly_sparse: true,
             backend: Backend::Auto,
             non_negative: false,
         }
@@ -206,10 +179,10 @@ impl Default for OmpSettings {
             basis: Basis::Dct,
             sparsity: Sparsity::CrossValidated { most: Self::MOST_ATOMS, folds: 4 },
             residual: 0.0,
-            falloff: 1.0,
+            falloff: Some(1.0),
             noise: NoiseLevel::Estimated,
             visibility: Self::LEAST_VISIBILITY,
-            completion: Completion::Measured,
+            exactly_sparse: false,
             backend: Backend::Auto,
             non_negative: false,
         }
@@ -225,9 +198,14 @@ pub struct OmpReconstruction {
     pub sparsity: usize,
     /// Why the pursuit stopped; [`Stop::Sparsity`] if cross-validation chose the number of atoms.
     pub stop: Stop,
-    /// Norm of the difference between the measurements and their representation, relative to the
-    /// measurements' norm.
+    /// Norm of the difference between the measurements and the image, relative to the measurements'
+    /// norm.
     pub residual: f64,
+    /// Mean weight of the readings in the measured rows: 1 where noise does not matter, 0 where the
+    /// image is the fit.
+    pub reading_weight: f64,
+    /// How well readings were predicted without them; `None` if none was held back.
+    pub held_back: Option<HeldBack>,
     /// Number of atoms that the measured rows do not see.
     pub unseen_atoms: usize,
     /// Trust: factor on the prediction for rows that were not measured, 0 (zero filling) to 1.
@@ -274,6 +252,23 @@ pub enum ReconstructError {
         /// The method.
         method: Method,
     },
+    /// The method completes measurements by a network, and the settings hold none.
+    #[error("the method {method} needs a network: give it one, or choose another method")]
+    NeedsNetwork {
+        /// The method.
+        method: Method,
+    },
+    /// The network does not complete images of this side.
+    #[error(
+        "the network {network} does not complete images of {side} x {side} pixels: choose another method, such as {}",
+        Method::TIKHONOV
+    )]
+    NetworkSide {
+        /// The network's name.
+        network: String,
+        /// Side of the images.
+        side: usize,
+    },
     /// The pursuit refused the problem.
     #[error(transparent)]
     Pursuit(#[from] OmpError),
@@ -297,7 +292,7 @@ pub fn omp(
     let dictionary = problem.dictionary(&every);
     let found = problem.pursue(&dictionary, &every, &[choice.atoms])?.remove(0);
     let predicted = dictionary.predict(&found.support, &found.coefficients);
-    Ok(reconstruction(&problem, found, predicted, settings.completion, choice.trust))
+    Ok(reconstruction(&problem, found, predicted, settings, &choice))
 }
 
 fn choose_atoms(
@@ -305,8 +300,10 @@ fn choose_atoms(
     settings: &OmpSettings,
 ) -> Result<selection::Choice, OmpError> {
     match settings.sparsity {
-        Sparsity::Fixed(atoms) => Ok(selection::Choice { atoms, trust: 1.0 }),
-        Sparsity::Noise => Ok(selection::Choice { atoms: problem.rows.len(), trust: 1.0 }),
+        Sparsity::Fixed(atoms) => Ok(selection::Choice { atoms, trust: 1.0, held_back: None }),
+        Sparsity::Noise => {
+            Ok(selection::Choice { atoms: problem.rows.len(), trust: 1.0, held_back: None })
+        }
         Sparsity::CrossValidated { most, folds } => selection::choose(problem, most, folds),
     }
 }
@@ -316,39 +313,63 @@ fn reconstruction(
     problem: &Problem<'_>,
     found: Found,
     predicted: Vec<f32>,
-    completion: Completion,
-    trust: f32,
+    settings: &OmpSettings,
+    choice: &selection::Choice,
 ) -> OmpReconstruction {
-    let residual = problem.residual_of(&predicted);
+    let made = match settings.exactly_sparse || settings.non_negative {
+        true => Made::of_prediction(problem, predicted),
+        false => Made::weighted(problem, predicted, choice.trust, choice.held_back.as_deref()),
+    };
     OmpReconstruction {
-        image: image_of(problem, predicted, completion, trust),
+        image: made.image,
         sparsity: found.support.len(),
         stop: found.stop,
-        residual,
+        residual: made.residual,
+        reading_weight: made.reading_weight,
+        held_back: problem.judge(choice.held_back.as_deref(), choice.trust),
         unseen_atoms: found.unseen,
-        trust: f64::from(trust),
+        trust: f64::from(choice.trust),
         noise: problem.noise_in_units(),
     }
 }
 
-/// The image of a prediction of all rows, in the measurements' units.
-fn image_of(
-    problem: &Problem<'_>,
-    predicted: Vec<f32>,
-    completion: Completion,
-    trust: f32,
-) -> Image {
-    let mut grid = predicted;
-    if completion == Completion::Measured {
-        grid.iter_mut().for_each(|v| *v *= trust);
-        for (&row, &value) in problem.rows.iter().zip(&problem.values) {
-            grid[row as usize] = value;
-        }
+/// An image of a prediction of all rows.
+struct Made {
+    image: Image,
+    /// Norm of the difference between the measurements and the image, relative to the measurements'
+    /// norm.
+    residual: f64,
+    /// Mean weight of the readings in the measured rows.
+    reading_weight: f64,
+}
+
+impl Made {
+    /// The image of the prediction itself.
+    fn of_prediction(problem: &Problem<'_>, mut grid: Vec<f32>) -> Self {
+        let residual = problem.residual_of(&grid);
+        let n = problem.side.pixels() as f32;
+        fwht::transform(&mut grid);
+        let pixels = grid.iter().map(|v| (f64::from(v / n) * problem.unit) as f32).collect();
+        Self { image: Image::new(problem.side, pixels), residual, reading_weight: 0.0 }
     }
-    let n = problem.side.pixels() as f32;
-    fwht::transform(&mut grid);
-    let pixels = grid.iter().map(|v| (f64::from(v / n) * problem.unit) as f32).collect();
-    Image::new(problem.side, pixels)
+
+    /// The prediction is believed by the factor `trust`, and the measured rows are weighted means of
+    /// reading and prediction: of what was predicted without the reading, if it was held back, so
+    /// that its noise is not in both.
+    fn weighted(
+        problem: &Problem<'_>,
+        mut grid: Vec<f32>,
+        trust: f32,
+        held_back: Option<&[f32]>,
+    ) -> Self {
+        for (&row, &predicted) in problem.rows.iter().zip(held_back.unwrap_or_default()) {
+            grid[row as usize] = predicted;
+        }
+        grid.iter_mut().for_each(|v| *v *= trust);
+        let reading_weight =
+            weight::weigh(problem.rows, &problem.values, problem.reading_noise(), &mut grid);
+        Self { reading_weight, ..Self::of_prediction(problem, grid) }
+    }
 }
 
 /// Measurements and prior in orthonormal units, scaled so that the largest measurement is 1. So
@@ -361,15 +382,23 @@ struct Problem<'a> {
     unit: f64,
     transform: Transform,
     prior: Prior,
+    /// Noise of a reading, unless it is still to be estimated. `prior.noise` also holds detail that
+    /// the prior does not expect.
+    reading_noise: Option<f32>,
     /// Norm of the residual, relative to the measurements' norm, at which a pursuit stops.
     residual: f64,
-    /// Whether a pursuit also stops at the noise.
-    to_noise: bool,
+    /// The noise at which a pursuit also stops; 0 for none.
+    to_noise: f32,
     how: How,
 }
 
 impl<'a> Problem<'a> {
-    fn of(measurements: &'a Measurements, basis: Basis, falloff: f64, noise: NoiseLevel) -> Self {
+    fn of(
+        measurements: &'a Measurements,
+        basis: Basis,
+        falloff: Option<f64>,
+        noise: NoiseLevel,
+    ) -> Self {
         let side = measurements.side();
         let rows = measurements.rows();
         let n = side.pixels() as f64;
@@ -378,22 +407,29 @@ impl<'a> Problem<'a> {
         let values: Vec<f32> =
             measurements.values().iter().map(|v| (v / n / unit) as f32).collect();
         let transform = Transform::new(basis, side);
-        let noise = match noise {
-            NoiseLevel::Known(sigma) => (sigma / n / unit) as f32,
-            NoiseLevel::Estimated => selection::noise_level(rows, &values),
+        let in_units = |sigma: f64| (sigma / n / unit) as f32;
+        let statistics = falloff.is_none().then(|| Statistics::of(rows, &values));
+        let (noise, reading_noise) = match noise {
+            NoiseLevel::Known(sigma) => (in_units(sigma), Some(in_units(sigma))),
+            NoiseLevel::Estimated => {
+                let estimated = statistics.map(|statistics| statistics.noise);
+                let known = measurements.noise().map(in_units).or(estimated);
+                (selection::noise_level(rows, &values), known)
+            }
         };
+        let falloff = falloff.or(statistics.map(|statistics| statistics.falloff)).unwrap_or(1.0);
         let scale = prior_scale(&transform, rows, &values, falloff);
         let prior = Prior { scale, noise, visibility: 0.0 };
         let how = How { non_negative: false, backend: Backend::Auto };
-        let (residual, to_noise) = (0.0, false);
-        Self { side, rows, values, unit, transform, prior, residual, to_noise, how }
+        let (residual, to_noise) = (0.0, 0.0);
+        Self { side, rows, values, unit, transform, prior, reading_noise, residual, to_noise, how }
     }
 
     fn new(measurements: &'a Measurements, settings: &OmpSettings) -> Self {
         let mut problem = Self::of(measurements, settings.basis, settings.falloff, settings.noise);
         problem.prior.visibility = settings.visibility as f32;
         problem.residual = settings.residual;
-        problem.to_noise = settings.sparsity == Sparsity::Noise;
+        problem.stop_at_noise(settings.sparsity, measurements);
         problem.how = settings.how();
         problem
     }
@@ -415,7 +451,26 @@ impl<'a> Problem<'a> {
 
     /// Noise of a measurement in the measurements' units.
     fn noise_in_units(&self) -> f64 {
-        f64::from(self.prior.noise * self.side.pixels() as f32) * self.unit
+        f64::from(self.reading_noise() * self.side.pixels() as f32) * self.unit
+    }
+
+    fn judge(&self, held_back: Option<&[f32]>, trust: f32) -> Option<HeldBack> {
+        HeldBack::of(self.rows, &self.values, held_back?, trust)
+    }
+
+    fn reading_noise(&self) -> f32 {
+        let estimated = || Statistics::of(self.rows, &self.values).noise;
+        self.reading_noise.unwrap_or_else(estimated)
+    }
+
+    /// With [`Sparsity::Noise`] a pursuit also stops at the noise: the measured one, else the upper
+    /// bound, as an estimate of 0 would stop no pursuit.
+    fn stop_at_noise(&mut self, sparsity: Sparsity, measurements: &Measurements) {
+        self.to_noise = match (sparsity, measurements.noise()) {
+            (Sparsity::Noise, Some(_)) => self.reading_noise(),
+            (Sparsity::Noise, None) => self.prior.noise,
+            _ => 0.0,
+        };
     }
 
     /// The basis, measured by the rows at these positions.
@@ -438,8 +493,7 @@ impl<'a> Problem<'a> {
 
     /// Limits of a pursuit, whatever the number of atoms.
     fn limits(&self) -> Limits {
-        let noise = if self.to_noise { f64::from(self.prior.noise) } else { 0.0 };
-        Limits { sparsity: 0, residual: self.residual, noise }
+        Limits { sparsity: 0, residual: self.residual, noise: f64::from(self.to_noise) }
     }
 }
 
@@ -493,10 +547,12 @@ impl OmpSettings {
     }
 }
 
-fn check_prior(falloff: f64, noise: NoiseLevel) -> Result<(), ReconstructError> {
+fn check_prior(falloff: Option<f64>, noise: NoiseLevel) -> Result<(), ReconstructError> {
     let refuse =
         |setting, found, expected| Err(ReconstructError::Setting { setting, found, expected });
-    if !(0.0..=8.0).contains(&falloff) {
+    if let Some(falloff) = falloff
+        && !(0.0..=8.0).contains(&falloff)
+    {
         return refuse("falloff", falloff, "0 to 8");
     }
     match noise {

@@ -6,7 +6,8 @@ use thiserror::Error;
 
 /// A share of the patterns: more than 0, at most 1.
 ///
-/// People write a share as `0.3`, `30%` or `30`; [`Sampling::from_str`] reads all three.
+/// People write a share as `0.3` or `30%`; [`Sampling::from_str`] reads both. A number above 1
+/// without a percent sign is refused: `2` may be meant as 2 % or as twice as many patterns.
 ///
 /// # Invariant
 /// The share is more than 0 and at most 1 (`tests::every_way_to_write_a_share_gives_the_share`).
@@ -14,7 +15,7 @@ use thiserror::Error;
 /// ```
 /// use nirspi_recon::Sampling;
 ///
-/// for text in ["0.3", "30%", "30 %", "30"] {
+/// for text in ["0.3", "30%", "30 %"] {
 ///     assert_eq!(text.parse(), Sampling::new(0.3));
 /// }
 /// # Ok::<(), nirspi_recon::SamplingError>(())
@@ -26,13 +27,15 @@ pub struct Sampling(f64);
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum SamplingError {
     /// No number, or a number that is out of range.
-    #[error("expected more than 0 and at most 1 (0.3), or a percentage (30% or 30)")]
+    #[error("expected more than 0 and at most 1 (0.3), or a percentage (30%)")]
     Range,
-    /// A number between 1 and 2 without a percent sign.
-    #[error("expected at most 1; a percentage below 2 needs its sign: {found}%")]
-    Ambiguous {
+    /// A percentage without its sign.
+    #[error("expected at most 1, or a percentage with its sign: write {found}% or {share}")]
+    NoSign {
         /// The number.
         found: String,
+        /// The number as a share.
+        share: String,
     },
 }
 
@@ -60,8 +63,7 @@ impl Sampling {
 impl FromStr for Sampling {
     type Err = SamplingError;
 
-    /// Reads a share (`0.3`) or a percentage (`30%`, `30 %`, or a number from 2 to 100). A number
-    /// between 1 and 2 could be either and is refused.
+    /// Reads a share (`0.3`) or a percentage (`30%`, `30 %`).
     fn from_str(text: &str) -> Result<Self, SamplingError> {
         let text = text.trim();
         let (number, percent) = match text.strip_suffix('%') {
@@ -69,11 +71,15 @@ impl FromStr for Sampling {
             None => (text, false),
         };
         let value: f64 = number.parse().map_err(|_| SamplingError::Range)?;
-        match value {
-            _ if !percent && value > 1.0 && value < 2.0 => {
-                Err(SamplingError::Ambiguous { found: number.to_owned() })
+        let of_percent = Self::new(value / 100.0);
+        match of_percent {
+            Ok(_) if !percent && value > 1.0 => {
+                // A share of 1.5 % is 0.015, and not the nearest binary fraction in all its digits.
+                let digits = format!("{:.6}", value / 100.0);
+                let share = digits.trim_end_matches('0').trim_end_matches('.').to_owned();
+                Err(SamplingError::NoSign { found: number.to_owned(), share })
             }
-            _ if percent || value > 1.0 => Self::new(value / 100.0),
+            _ if percent => of_percent,
             _ => Self::new(value),
         }
     }
@@ -95,10 +101,9 @@ mod tests {
         fn every_way_to_write_a_share_gives_the_share(percent in 2_u32..=100, space in " {0,2}") {
             let share = Sampling::new(f64::from(percent) / 100.0).unwrap();
             for text in [
-                format!("{percent}"),
                 format!("{percent}%"),
                 format!("{percent}{space}%"),
-                format!("{percent}.0"),
+                format!("{percent}.0%"),
                 format!("{share}"),
             ] {
                 prop_assert_eq!(text.parse(), Ok(share), "{}", text);
@@ -122,8 +127,15 @@ mod tests {
         {
             assert_eq!(text.parse::<Sampling>(), Err(SamplingError::Range), "{text}");
         }
-        let error = "1.5".parse::<Sampling>().unwrap_err().to_string();
-        assert!(error.ends_with("1.5%"), "{error}");
+        for (text, advice) in [
+            ("1.5", "write 1.5% or 0.015"),
+            ("2", "write 2% or 0.02"),
+            ("30", "write 30% or 0.3"),
+            ("100", "write 100% or 1"),
+        ] {
+            let error = text.parse::<Sampling>().unwrap_err().to_string();
+            assert!(error.ends_with(advice), "{error}");
+        }
         assert_eq!("1.5%".parse(), Sampling::new(0.015));
         assert_eq!("1".parse(), Ok(Sampling::ALL));
     }

@@ -10,9 +10,11 @@ use super::{ArchiveReport, Work};
 use crate::calibration::{FlatField, Settling};
 use crate::causes::in_one_line;
 use crate::dataset::Row;
-use crate::imaging::compare;
+use crate::exposure::{Exposure, Length};
+use crate::imaging::score;
 use crate::reconstruct::Solver;
 use crate::scene::{SceneError, SceneMap, SceneSource};
+use crate::setup::MeasurementSetup;
 use crate::source::Source;
 use crate::virtual_camera::{
     CameraModel, ShotError, VirtualOptics, calibrate_against_white, flat_field_against_white, shoot,
@@ -47,8 +49,8 @@ pub struct GridAxes {
     pub samplings: Vec<Sampling>,
     /// Seeds of the simulated noise.
     pub seeds: Vec<u64>,
-    /// Frames summed into a measurement.
-    pub frames: u32,
+    /// How long each measurement goes on.
+    pub length: Length,
 }
 
 /// Why there is no set.
@@ -140,8 +142,10 @@ impl Grid {
                 return Err(GridError::Range { name: "distance", found, expected });
             }
         }
-        if !(1..=100_000).contains(&axes.frames) {
-            let (found, expected) = (f64::from(axes.frames), "1 to 100000");
+        if let Length::Frames(frames, _) = axes.length
+            && !(1..=100_000).contains(&frames)
+        {
+            let (found, expected) = (f64::from(frames), "1 to 100000");
             return Err(GridError::Range { name: "frames", found, expected });
         }
         let texts = [
@@ -203,9 +207,13 @@ impl Grid {
             .and_then(|optics| optics.in_air(air))
             .map_err(|error| told(&error))?;
         let setup = optics.setup(order, sampling.share()).map_err(|error| told(&error))?;
+        let Exposure { frames, sweeps } =
+            Exposure::of(axes.length, &setup).map_err(|error| told(&error))?;
+        let setup = MeasurementSetup { sweeps, ..setup };
+        let light_ms = setup.frame_ns() * f64::from(frames) * 1e-6;
         let setup_id = setup.id();
         let mut go_on = |_: &crate::capture::Progress| ControlFlow::Continue(());
-        let shot = shoot(&optics, setup, &self.settling, axes.frames, seed, &mut go_on)
+        let shot = shoot(&optics, setup, &self.settling, frames, seed, &mut go_on)
             .map_err(|error| told(&error))?;
         let truth = optics.focused_footprint().map_err(|error| told(&error))?.weights().to_vec();
         let source = Source::of_capture(&shot.capture).map_err(|error| told(&error))?;
@@ -215,7 +223,7 @@ impl Grid {
             .solve(Path::new(&self.names[item]), &source)
             .map_err(|error| in_one_line(&error))?;
         let truth: Vec<f32> = truth;
-        let fitted = compare(&solved.image, &truth).map_err(|error| told(&error))?;
+        let quality = score(&solved.image, &truth).map_err(|error| told(&error))?;
         let identity = shot.session.identity();
         let known = json!({
             "camera": identity,
@@ -224,15 +232,16 @@ impl Grid {
             "order": order.to_string(),
             "sampling": sampling.share(),
             "seed": seed,
-            "frames": axes.frames,
-            "quality": fitted.quality,
+            "frames": frames,
+            "light_ms": light_ms,
+            "quality": quality,
         });
         Ok(Row {
             image_id: self.names[item].clone(),
             n: solved.image.side().pixels() as u32,
             rows: source.measurements.rows().as_slice().to_vec(),
             d: source.measurements.values().to_vec(),
-            sweeps: Some(axes.frames.into()),
+            sweeps: Some(i64::from(frames) * i64::from(sweeps)),
             serial: Some(identity.serial.clone()),
             board: Some(identity.board.clone()),
             simulated: Some(true),
@@ -272,7 +281,7 @@ impl Grid {
              | scene | {scenes} |\n| weather | {weathers} |\n| distance in m | {distances} |\n\
              | order | {orders} |\n| share of the patterns | {samplings} |\n| seed | {seeds} |\n\n\
              - **Rows**: {rows}, share {shard} of {items}.\n\
-             - **Measurement**: {frames} summed, differential, the camera calibrated once against a white sheet,\n\
+             - **Measurement**: {length}, summed, differential, the camera calibrated once against a white sheet,\n\
              \x20 the leak from pattern to pattern corrected. `d` is in ADC counts.\n\
              - **image**: by the method {method}, of all patterns of the row, in ADC counts. `meta` has its report,\n\
              \x20 and under `quality` how alike it is to `truth` after a fit of gain and offset.\n\
@@ -289,7 +298,7 @@ impl Grid {
             seeds = list(&seeds),
             rows = report.rows,
             items = count(self.names.len() as u64, "measurement"),
-            frames = count(axes.frames, "frame"),
+            length = axes.length,
             model = self.model.to_toml(),
         )
     }
@@ -307,7 +316,7 @@ impl Work for Grid {
     fn settings(&self) -> Map<String, Value> {
         let mut settings = self.solver.settings();
         settings.insert("camera".to_owned(), self.model.to_toml().into());
-        settings.insert("frames".to_owned(), self.axes.frames.into());
+        settings.insert("length".to_owned(), self.axes.length.to_string().into());
         // The names hold every other value.
         let names = self.names.join("\n");
         let names = format!("{:08x}", nirspi_wire::crc32(names.as_bytes()));
@@ -337,7 +346,7 @@ mod tests {
             orders: vec![Order::ZigZag, Order::CakeCutting],
             samplings: vec![Sampling::new(0.1).unwrap()],
             seeds: vec![1, 2],
-            frames: 4,
+            length: Length::Frames(4, None),
         }
     }
 
@@ -384,7 +393,10 @@ mod tests {
                 GridAxes { distances_m: vec![0.3, -1.0], ..axes() },
                 "distance -1, expected a positive",
             ),
-            (GridAxes { frames: 0, ..axes() }, "frames 0, expected 1 to 100000"),
+            (
+                GridAxes { length: Length::Frames(0, None), ..axes() },
+                "frames 0, expected 1 to 100000",
+            ),
             (GridAxes { weathers: vec!["snow".to_owned()], ..axes() }, "weather: "),
         ] {
             let Err(error) = grid(axes) else { panic!("{told}") };

@@ -9,7 +9,7 @@ use crate::export::{ExportError, Whole};
 use crate::imaging::FramesError;
 use crate::imaging::MethodReport;
 use crate::reconstruct::{Solved, Solver, SolverError};
-use crate::source::{Index, Source, SourceError, SourceOptions};
+use crate::source::{Index, OutlierReport, Source, SourceError, SourceOptions};
 #[cfg(feature = "enhance")]
 use nirspi_nets::Device;
 use nirspi_recon::Measurements;
@@ -163,7 +163,7 @@ impl RowReader {
             _ => Source::read_all(path, &self.source)?,
         };
         let row = |source: Source| {
-            let row = Row { simulated: source.simulated, ..row_of(&source.measurements) };
+            let row = Row { simulated: source.taken.simulated(), ..row_of(&source.measurements) };
             (row, source)
         };
         Ok(sources.into_iter().map(row).collect())
@@ -211,8 +211,10 @@ pub(super) fn meta(of_camera: &str, source: &Source, solved: &Solved) -> String 
         "used": solved.used.rows().len(),
         "order": solved.order,
         "dropouts": dropouts.collect::<Vec<_>>(),
+        "outliers": source.outliers.iter().map(OutlierReport::of).collect::<Vec<_>>(),
         "not_read": source.not_read,
         "frames": source.frames,
+        "warnings": source.warnings,
         "notes": source.notes,
     });
     meta.insert("reconstruction".to_owned(), made);
@@ -261,7 +263,7 @@ impl Work for ImageFiles {
 
     fn settings(&self) -> Map<String, Value> {
         let mut settings = self.reader.solver.settings();
-        settings.insert("input".to_owned(), format!("{:?}", self.reader.source).into());
+        settings.insert("input".to_owned(), self.reader.source.key());
         settings.insert("enhance".to_owned(), self.reader.enhances().into());
         settings
     }

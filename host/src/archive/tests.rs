@@ -1,5 +1,7 @@
 use super::*;
 use crate::files::measurement::encode;
+use crate::provenance::tests::provenance;
+use crate::provenance::{Origin, Taken};
 use crate::reconstruct::{Recipe, Solver};
 use crate::source::{FirstPatterns, Index, Source, SourceOptions};
 use nirspi_recon::reconstruct::{Method, MethodSettings};
@@ -31,7 +33,9 @@ pub(super) fn folder_of(count: usize) -> (tempfile::TempDir, PathBuf, PathBuf) {
         let d: Vec<f64> = (0..16).map(|i| ((k * 31 + i * 17) % 23) as f64 - 7.0).collect();
         let measured = Measurements::from_differential(&rows, &d).unwrap();
         let path = files.join(format!("{k:04}.npz"));
-        std::fs::write(&path, encode(&path, &measured, k % 2 == 0).unwrap()).unwrap();
+        let origin = if k % 2 == 0 { Origin::Simulated } else { Origin::Measured };
+        let (origin, made) = (Taken::without_camera(origin), provenance().made);
+        std::fs::write(&path, encode(&path, &measured, &origin.made(&made)).unwrap()).unwrap();
     }
     (root, files, out)
 }

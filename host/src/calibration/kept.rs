@@ -13,6 +13,7 @@
 
 use super::Settling;
 use super::file::{Kept, KeptFileError};
+use crate::clock;
 use crate::selftest::Check;
 use crate::session::CameraIdentity;
 use etcetera::{BaseStrategy, choose_base_strategy};
@@ -120,22 +121,9 @@ fn file_name(serial: &str) -> String {
         .collect()
 }
 
-/// A time as `2026-11-20 08:30 UTC`. The Gregorian calendar is computed with years that begin in
-/// March, so that a leap day is the last day of a year (H. Hinnant, *chrono-Compatible Low-Level
-/// Date Algorithms*, `civil_from_days`).
+/// A time as `2026-11-20 08:30 UTC`.
 pub(crate) fn date(unix_s: u64) -> String {
-    // Days from 1 March of year 0 to 1 January 1970; an era is 400 years.
-    const DAYS_BEFORE_1970: u64 = 719_468;
-    const DAYS_OF_ERA: u64 = 146_097;
-    let (days, seconds) = (unix_s / 86_400 + DAYS_BEFORE_1970, unix_s % 86_400);
-    let (era, day) = (days / DAYS_OF_ERA, days % DAYS_OF_ERA);
-    let year = (day - day / 1460 + day / 36_524 - day / (DAYS_OF_ERA - 1)) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month_from_march = (5 * day + 2) / 153;
-    let day = day - (153 * month_from_march + 2) / 5 + 1;
-    let month = (month_from_march + 2) % 12 + 1;
-    let year = era * 400 + year + u64::from(month <= 2);
-    let (hour, minute) = (seconds / 3600, seconds / 60 % 60);
+    let [year, month, day, hour, minute, _] = clock::calendar(unix_s);
     format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
 }
 

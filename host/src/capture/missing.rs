@@ -97,16 +97,32 @@ fn frames(counters: LossCounters) -> Option<String> {
 mod tests {
     use super::*;
     use crate::integrate::Integrated;
-    use crate::session::SessionError;
+    use crate::session::{CameraIdentity, SessionError};
     use crate::setup::MeasurementSetup;
     use nirspi_recon::Order;
     use nirspi_wire::Fault;
     use std::time::Duration;
 
+    fn camera() -> CameraIdentity {
+        CameraIdentity {
+            protocol: 4,
+            firmware: "0.1.0".into(),
+            gateware: "0.3.2".into(),
+            board: "virtual".into(),
+            serial: "virtual-1".into(),
+            adc_hz: 125_000_000,
+            adc_bits: 14,
+            wavelength_nm: 1550,
+            capabilities: Vec::new(),
+            detectors: 1,
+        }
+    }
+
     /// A capture of 50 frames without anything missing.
     fn whole() -> Capture {
         let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
         Capture {
+            camera: camera(),
             integrated: Integrated::new(&setup),
             setup,
             settling: None,

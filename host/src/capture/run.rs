@@ -325,6 +325,7 @@ impl Run {
         };
         let account = self.tally.account();
         let mut captured = Capture {
+            camera: session.identity().clone(),
             setup: self.setup,
             settling: self.settling,
             calibration_problem: self.calibration_problem,

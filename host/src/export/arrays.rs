@@ -2,10 +2,12 @@
 
 use super::{ExportError, Whole, detectors};
 use crate::files::FileError;
-use crate::files::npy::{Element, encode, header};
-use crate::files::output::write_in_pieces;
+use crate::files::measurement::PROVENANCE;
+use crate::files::npy::{Element, encode, encode_text, header};
+use crate::files::output::{write_atomic, write_in_pieces};
+use crate::provenance::Provenance;
 use std::io::{self, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -13,7 +15,12 @@ use zip::{CompressionMethod, ZipWriter};
 /// compressor.
 ///
 /// With `every_detector`, `d` and `frames` of a camera with several detectors have an axis for them.
-pub(super) fn npz(whole: &Whole, out: &Path, every_detector: bool) -> Result<(), ExportError> {
+pub(super) fn npz(
+    whole: &Whole,
+    out: &Path,
+    every_detector: bool,
+    provenance: &Provenance,
+) -> Result<(), ExportError> {
     let detectors = if every_detector { detectors::number(whole) } else { 1 };
     write_in_pieces(out, |file| {
         let mut zip = Members { zip: ZipWriter::new(file), out };
@@ -30,6 +37,7 @@ pub(super) fn npz(whole: &Whole, out: &Path, every_detector: bool) -> Result<(),
         zip.add("device_time_us", &encode(&[count], &whole.device_time_us))?;
         zip.add("time_ns", &encode(&[count], &whole.time_ns))?;
         zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
+        zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
         zip.begin("frames")?;
         match detectors {
             1 => frames(whole, out, &mut zip.zip)?,
@@ -62,9 +70,19 @@ impl<W: Write + Seek> Members<'_, W> {
     }
 }
 
-/// Writes the readings of each frame as one array (F, M).
-pub(super) fn npy(whole: &Whole, out: &Path) -> Result<(), ExportError> {
-    write_in_pieces(out, |file| frames(whole, out, file))
+/// Writes the readings of each frame as one array (F, M), and the provenance into a file beside it.
+pub(super) fn npy(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
+    write_in_pieces(out, |file| frames(whole, out, file))?;
+    let beside = beside(out);
+    let text = provenance.sign(&serde_json::json!({})).unwrap_or_default();
+    Ok(write_atomic(&beside, text.as_bytes())?)
+}
+
+/// The file with the provenance of an `.npy` file: the same name with `.json` after it.
+fn beside(out: &Path) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(".json");
+    name.into()
 }
 
 fn frames(whole: &Whole, out: &Path, to: &mut impl Write) -> Result<(), ExportError> {
@@ -82,8 +100,8 @@ fn frames(whole: &Whole, out: &Path, to: &mut impl Write) -> Result<(), ExportEr
 }
 
 /// Writes the mean of all frames, one pattern a line, under the heading `n,h_row,d`. The numbers
-/// read back as they were.
-pub(super) fn csv(whole: &Whole, out: &Path) -> Result<(), ExportError> {
+/// read back as they were. Comments before the heading have the provenance.
+pub(super) fn csv(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
     let measurements = &whole.source.measurements;
     let n = measurements.side().pixels();
     write_in_pieces(out, |file| {
@@ -91,6 +109,7 @@ pub(super) fn csv(whole: &Whole, out: &Path) -> Result<(), ExportError> {
         let write = || -> io::Result<()> {
             let what = if whole.is_simulated() { ", simulated" } else { "" };
             writeln!(file, "# mean of {} frames, ADC counts{what}", whole.frames())?;
+            writeln!(file, "# {PROVENANCE}: {}", provenance.json())?;
             writeln!(file, "n,h_row,d")?;
             // A point shows that commas separate numbers.
             lines.into_iter().try_for_each(|(row, d)| writeln!(file, "{n},{row},{d:?}"))

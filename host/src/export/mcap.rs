@@ -7,6 +7,7 @@ use super::{ExportError, ExportOptions, Whole};
 use crate::files::FileError;
 use crate::files::output::write_in_pieces;
 use crate::integrate::Integrated;
+use crate::provenance::Provenance;
 use crate::recording::{Book, Opening, Recording};
 use crate::tally::{Heard, Tally, hear_recording};
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
@@ -26,6 +27,7 @@ pub(super) fn write(
     whole: &Whole,
     out: &Path,
     options: &ExportOptions,
+    provenance: &Provenance,
 ) -> Result<usize, ExportError> {
     let (mut images, mut range) = (0, [f32::INFINITY, f32::NEG_INFINITY]);
     #[cfg(feature = "enhance")]
@@ -49,7 +51,8 @@ pub(super) fn write(
         let (identity, setup) = (recording.identity.clone(), recording.setup.clone());
         let (settling, run) = (recording.settling.clone(), recording.run);
         let settling = settling.as_ref();
-        let opening = Opening { identity: &identity, setup: &setup, settling, run };
+        let (identity, setup, provenance) = (&identity, &setup, Some(provenance));
+        let opening = Opening { identity, setup, settling, run, provenance };
         let mut book = Book::begin(file, &opening).map_err(io_error)?;
         #[cfg(any(feature = "live", feature = "virtual-camera"))]
         if let Some(model) = &options.model {

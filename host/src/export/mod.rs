@@ -19,6 +19,7 @@ mod zarr;
 
 use crate::files::{FileError, npy};
 use crate::integrate::{IntegrateError, Integrated};
+use crate::provenance::Made;
 use crate::recording::{Recording, RecordingError};
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
@@ -237,7 +238,9 @@ pub enum ExportError {
     },
 }
 
-/// Exports a recording to the file or folder `out`, which is whole or not made.
+/// Exports a recording to the file or folder `out`, which is whole or not made. The file holds its
+/// provenance, of the recording and of the program `made`; an `.npy` file has no place for it and gets
+/// a file `NAME.npy.json` beside it.
 ///
 /// # Errors
 /// [`ExportError`] names the file and the problem.
@@ -246,6 +249,7 @@ pub fn export(
     out: &Path,
     format: Format,
     options: &ExportOptions,
+    made: &Made,
 ) -> Result<Exported, ExportError> {
     if let (Ok(from), Ok(to)) = (input.canonicalize(), out.canonicalize())
         && from == to
@@ -263,16 +267,17 @@ pub fn export(
         ..SourceOptions::default()
     };
     let whole = Whole::read(input, &source)?;
+    let provenance = &whole.source.taken.made(made);
     let mut images = 0;
     match format {
-        Format::Npz => arrays::npz(&whole, out, options.detector.is_none())?,
-        Format::Npy => arrays::npy(&whole, out)?,
-        Format::Zarr => zarr::write(&whole, out)?,
-        Format::Csv => arrays::csv(&whole, out)?,
-        Format::Parquet => parquet::write(&whole, out, options)?,
-        Format::Mcap => images = mcap::write(&whole, out, options)?,
+        Format::Npz => arrays::npz(&whole, out, options.detector.is_none(), provenance)?,
+        Format::Npy => arrays::npy(&whole, out, provenance)?,
+        Format::Zarr => zarr::write(&whole, out, provenance)?,
+        Format::Csv => arrays::csv(&whole, out, provenance)?,
+        Format::Parquet => parquet::write(&whole, out, options, provenance)?,
+        Format::Mcap => images = mcap::write(&whole, out, options, provenance)?,
         #[cfg(feature = "pictures")]
-        Format::Apng => images = video::apng(&whole, out)?,
+        Format::Apng => images = video::apng(&whole, out, provenance)?,
     }
     let bytes = size_of(out);
     let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
@@ -378,7 +383,7 @@ impl Whole {
 
     /// Whether no real light was measured.
     fn is_simulated(&self) -> bool {
-        self.identity.board == "virtual"
+        self.source.taken.simulated() == Some(true)
     }
 
     /// Reads the frames one by one.

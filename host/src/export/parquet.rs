@@ -6,13 +6,19 @@ use crate::dataset::{DATASET, DATASET_VERSION, Row, Rows};
 use crate::files::FileError;
 use crate::files::output::write_in_pieces;
 use crate::parquet::Table;
+use crate::provenance::{KEY, Provenance};
 use std::path::Path;
 
 /// Rows of a group. A reader takes a group at a time: 1024 frames of 1024 patterns are 8 MB.
 const GROUP: usize = 1024;
 
 /// Writes the recording as a dataset.
-pub(super) fn write(whole: &Whole, out: &Path, options: &ExportOptions) -> Result<(), ExportError> {
+pub(super) fn write(
+    whole: &Whole,
+    out: &Path,
+    options: &ExportOptions,
+    provenance: &Provenance,
+) -> Result<(), ExportError> {
     let n = whole.source.measurements.side().pixels();
     let truth = options.truth.as_deref().map(|path| read_truth(path, n)).transpose()?;
     let fixed =
@@ -31,7 +37,12 @@ pub(super) fn write(whole: &Whole, out: &Path, options: &ExportOptions) -> Resul
         if rows.count() > 0 {
             rows.take().and_then(|group| table.group(&group)).map_err(io_error)?;
         }
-        let about = [("nirspi.dataset", DATASET_VERSION), ("units.d", "ADC counts")];
+        let provenance = provenance.json();
+        let about = [
+            ("nirspi.dataset", DATASET_VERSION),
+            ("units.d", "ADC counts"),
+            (KEY, provenance.as_str()),
+        ];
         Ok(table.end(&about).map_err(io_error)?)
     })
 }

@@ -3,6 +3,7 @@
 use super::{ExportError, Whole};
 use crate::files::output::write_atomic;
 use crate::picture::{Unit, video};
+use crate::provenance::Provenance;
 use nirspi_recon::reconstruct::{Method, MethodSettings};
 use nirspi_recon::{Image, Measurements};
 use std::path::Path;
@@ -47,7 +48,11 @@ impl Groups {
 }
 
 /// Writes the video. Returns the number of images.
-pub(super) fn apng(whole: &Whole, out: &Path) -> Result<usize, ExportError> {
+pub(super) fn apng(
+    whole: &Whole,
+    out: &Path,
+    provenance: &Provenance,
+) -> Result<usize, ExportError> {
     let frames = whole.frames();
     let mut groups = Groups::new(frames, MOST);
     let problem = |frame| {
@@ -66,7 +71,7 @@ pub(super) fn apng(whole: &Whole, out: &Path) -> Result<usize, ExportError> {
         Ok(())
     })?;
     let header = format!("{}, {frames} frames", whole.path.display());
-    write_atomic(out, &video(&header, &images, Unit::AdcCounts))?;
+    write_atomic(out, &video(&header, &images, Unit::AdcCounts, provenance))?;
     Ok(images.len())
 }
 

@@ -5,8 +5,10 @@
 //! Source: *Zarr core specification, version 3*, <https://zarr-specs.readthedocs.io>.
 
 use super::{ExportError, Whole};
+use crate::files::measurement::PROVENANCE;
 use crate::files::npy::Element;
 use crate::files::whole_folder::WholeFolder;
+use crate::provenance::Provenance;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -16,7 +18,7 @@ const CHUNK: usize = 1024;
 pub(super) const DESCRIPTION: &str = "zarr.json";
 
 /// Writes the readings of each frame, their mean, and the times of the frames.
-pub(super) fn write(whole: &Whole, out: &Path) -> Result<(), ExportError> {
+pub(super) fn write(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
     let mut store = Store { folder: WholeFolder::create(out, DESCRIPTION)?, arrays: Map::new() };
     let rows = whole.source.measurements.rows();
     let h_row: Vec<i64> = rows.iter().map(|&row| row.into()).collect();
@@ -60,6 +62,7 @@ pub(super) fn write(whole: &Whole, out: &Path) -> Result<(), ExportError> {
     let mut attributes = whole.meta();
     attributes["n"] = rows.side().pixels().into();
     attributes["simulated"] = whole.is_simulated().into();
+    attributes[PROVENANCE] = serde_json::to_value(provenance).unwrap_or_default();
     store.end(attributes)
 }
 

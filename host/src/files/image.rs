@@ -10,19 +10,22 @@
 //! image in it.
 
 mod labelled;
+mod signed;
 
 use super::FileError;
 use super::plain::{kind_by_start, open_file};
-use ::image::codecs::png::PngEncoder;
+use crate::provenance::Provenance;
 use ::image::imageops::{self, FilterType};
 use ::image::{
-    ColorType, DynamicImage, ExtendedColorType, ImageBuffer, ImageDecoder, ImageEncoder,
-    ImageFormat, ImageReader, Limits, Luma, RgbImage,
+    ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Luma,
+    RgbImage,
 };
 use std::io::{BufRead, BufReader, Seek};
 use std::path::{Path, PathBuf};
 
 pub(crate) use labelled::{Placed, encode_labelled};
+pub use signed::provenance_of;
+pub(crate) use signed::sign;
 
 const EXPECTED: &str = "a PNG or JPEG image";
 /// The largest edge that the reader accepts. A scene is later averaged down to hundreds of pixels.
@@ -206,25 +209,30 @@ fn grey_of(picture: &DynamicImage, corner: (u32, u32), size: (u32, u32)) -> Vec<
     levels
 }
 
-/// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major. Values outside the range are
+/// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major, with their provenance. Values outside the range are
 /// clipped; NaN becomes black.
 ///
 /// # Panics
 /// If there are not exactly `width * height` values, or none.
 #[must_use]
-pub fn encode_grey(width: usize, height: usize, values: &[f32]) -> Vec<u8> {
+pub fn encode_grey(
+    width: usize,
+    height: usize,
+    values: &[f32],
+    provenance: &Provenance,
+) -> Vec<u8> {
     assert_eq!(width * height, values.len(), "values of a {width} x {height} picture");
     let levels: Vec<u8> = values.iter().map(|&value| to_level(value)).collect();
-    encode(&levels, width as u32, height as u32, ExtendedColorType::L8)
+    encode(&levels, (width as u32, height as u32), png::ColorType::Grayscale, provenance)
 }
 
-/// The bytes of an 8-bit colour PNG.
+/// The bytes of an 8-bit colour PNG with its provenance.
 ///
 /// # Panics
 /// If the picture has no pixel.
 #[must_use]
-pub fn encode_rgb(picture: &RgbImage) -> Vec<u8> {
-    encode(picture.as_raw(), picture.width(), picture.height(), ExtendedColorType::Rgb8)
+pub fn encode_rgb(picture: &RgbImage, provenance: &Provenance) -> Vec<u8> {
+    encode(picture.as_raw(), picture.dimensions(), png::ColorType::Rgb, provenance)
 }
 
 /// The 8-bit grey level of a value in `[0, 1]`; NaN is black.
@@ -233,11 +241,24 @@ pub fn to_level(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-fn encode(levels: &[u8], width: u32, height: u32, color: ExtendedColorType) -> Vec<u8> {
+fn encode(
+    levels: &[u8],
+    (width, height): (u32, u32),
+    color: png::ColorType,
+    provenance: &Provenance,
+) -> Vec<u8> {
     let mut bytes = Vec::new();
-    PngEncoder::new(&mut bytes)
-        .write_image(levels, width, height, color)
-        .expect("a picture of at least one pixel encodes into memory");
+    let encoded = (|| {
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(color);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Fast);
+        sign(&mut encoder, provenance)?;
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(levels)?;
+        writer.finish()
+    })();
+    encoded.expect("a picture of at least one pixel encodes into memory");
     bytes
 }
 

@@ -38,13 +38,14 @@ mod write;
 use super::FileError;
 pub use form::Form;
 pub use images::read_images_of;
+use nirspi_recon::law::Claim;
 use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
 pub use plain::{Plain, read_plain};
 use rayon::prelude::*;
 pub use stack::Stack;
 use std::path::Path;
-pub use write::encode;
+pub use write::{PROVENANCE, encode};
 
 /// What to read from a file, and what the file itself does not say.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -79,6 +80,15 @@ pub enum Readings {
     Single(Vec<f64>),
 }
 
+impl Readings {
+    /// The numbers, in the order of the patterns.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        let (Self::Pairs(values) | Self::Differential(values) | Self::Single(values)) = self;
+        values
+    }
+}
+
 /// One checked measurement: `h_row` has 1 to n^2 different rows of the n^2, and one finite reading
 /// or pair for each row.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,8 +103,15 @@ pub struct MeasurementFile {
     /// Positions in the order shown of the patterns that were read, one for each of
     /// [`h_row`](Self::h_row).
     pub places: Vec<usize>,
-    /// Positions of patterns that were not read: the reading is NaN, or the row is negative.
+    /// Positions of patterns that were not read: the reading is NaN or an instrument's word for
+    /// overload, or the row is negative.
     pub not_read: Vec<usize>,
+    /// The readings that are an instrument's word for overload, as the file numbers readings.
+    pub overloads: Vec<usize>,
+    /// What the readings are said to be.
+    pub claim: Claim,
+    /// Number of patterns, those that were not read included.
+    pub patterns: usize,
     /// The file's own reconstruction, if it holds one.
     pub reference: Option<Reference>,
     /// Whether the file says that no real light was measured; `None` if it does not say.
@@ -110,6 +127,18 @@ pub struct Reference {
     pub real: Image,
     /// The imaginary part of a complex image.
     pub imaginary: Option<Image>,
+}
+
+impl MeasurementFile {
+    /// The place in the file of a reading of [`readings`](Self::readings).
+    #[must_use]
+    pub fn place(&self, reading: usize) -> usize {
+        match self.claim.form {
+            Form::Pairs => 2 * self.places[reading / 2] + reading % 2,
+            Form::Halves => self.places[reading / 2] + (reading % 2) * self.patterns,
+            Form::Single | Form::Differences => self.places[reading],
+        }
+    }
 }
 
 /// Reads and checks a measurement file. If the file has both, `y` is read and not `d`.

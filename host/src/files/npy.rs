@@ -274,15 +274,28 @@ pub fn encode<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
 /// # Panics
 /// If there are more than a hundred axes.
 pub(crate) fn header<T: Element>(shape: &[usize]) -> Vec<u8> {
+    header_of(T::DESCR, shape)
+}
+
+/// The bytes of a `.npy` file with one text, which NumPy reads as `str`.
+#[must_use]
+pub fn encode_text(text: &str) -> Vec<u8> {
+    let letters = text.chars().count().max(1);
+    let mut bytes = header_of(&format!("<U{letters}"), &[]);
+    text.chars().for_each(|letter| bytes.extend_from_slice(&u32::from(letter).to_le_bytes()));
+    if text.is_empty() {
+        bytes.extend_from_slice(&[0; 4]);
+    }
+    bytes
+}
+
+fn header_of(descr: &str, shape: &[usize]) -> Vec<u8> {
     /// The data start at a multiple of this number of bytes, so that NumPy can map the file.
     const ALIGNMENT: usize = 64;
     let axes: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();
-    let mut header = format!(
-        "{{'descr': '{}', 'fortran_order': False, 'shape': {}, }}",
-        T::DESCR,
-        shape_text(&axes)
-    )
-    .into_bytes();
+    let mut header =
+        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {}, }}", shape_text(&axes))
+            .into_bytes();
     let before = MAGIC.len() + 4;
     let end = (before + header.len() + 1).next_multiple_of(ALIGNMENT);
     header.resize(end - before - 1, b' ');

@@ -6,10 +6,13 @@
 //! first (`host/cli/tests/cli/enhance.rs`).
 
 use super::FileError;
-use super::image::{FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, read_grey};
+use super::image::{
+    FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, provenance_of, read_grey,
+};
 use super::npy;
 use super::output::{OutputDir, write_atomic};
 use crate::picture::{Panel, Pictures, Sheet, SideBySide, Unit};
+use crate::provenance::{Provenance, Taken};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -70,6 +73,9 @@ pub enum StackError {
         count: usize,
     },
 }
+
+/// So far, in shares of white, noise takes values below black and above white.
+const NOISE: f32 = 0.5;
 
 type Result<T> = std::result::Result<T, StackError>;
 
@@ -148,6 +154,22 @@ impl ImageStack {
         Ok(Self { path: path.to_owned(), count: files.len(), height, width, values, form })
     }
 
+    /// Cuts values that noise has taken out of `[0, 1]` to 0 or 1, as images in shares of white have
+    /// them. Returns the number of values cut. If a value is off by [`NOISE`] or more, the images
+    /// have another scale: they stay as they are.
+    pub fn cut_noise(&mut self) -> usize {
+        let is_near = |value: &f32| *value > -NOISE && *value < 1.0 + NOISE;
+        if !self.values.iter().all(is_near) {
+            return 0;
+        }
+        let mut cut = 0;
+        for value in self.values.iter_mut().filter(|value| !(0.0..=1.0).contains(*value)) {
+            *value = value.clamp(0.0, 1.0);
+            cut += 1;
+        }
+        cut
+    }
+
     /// The number of images.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -158,6 +180,33 @@ impl ImageStack {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Where the images come from: what a picture of this program says of itself, and else an unknown
+    /// camera. Several pictures are of one origin only if all say the same.
+    ///
+    /// # Errors
+    /// [`StackError::File`] if a picture states a damaged provenance.
+    pub fn taken(&self) -> Result<Taken> {
+        let unknown = Taken::of_file(&self.path, None);
+        let Form::Pictures(_) = &self.form else { return Ok(unknown) };
+        let files = match self.path.is_dir() {
+            true => pictures_in(&self.path)?,
+            false => vec![self.path.clone()],
+        };
+        let mut all = Vec::with_capacity(files.len());
+        for file in files.iter().filter(|file| has_extension(file, "png")) {
+            all.push(provenance_of(file)?.map(|found| found.taken));
+        }
+        Ok(match all.first().cloned().flatten() {
+            Some(first) if all.len() == files.len() => {
+                match all.iter().all(|taken| taken.as_ref() == Some(&first)) {
+                    true => first,
+                    false => unknown,
+                }
+            }
+            _ => unknown,
+        })
     }
 
     /// The values of the images, row-major, one after another.
@@ -233,17 +282,19 @@ impl StackTarget {
     ///
     /// # Errors
     /// [`StackError::File`] if the images cannot be written.
-    pub fn write(&self, side: usize, values: &[f32]) -> Result<()> {
+    pub fn write(&self, side: usize, values: &[f32], provenance: &Provenance) -> Result<()> {
         match &self.kind {
             Kind::Array(Some(count)) => {
                 write_atomic(&self.path, &npy::encode(&[*count, side, side], values))?;
             }
             Kind::Array(None) => write_atomic(&self.path, &npy::encode(&[side, side], values))?,
-            Kind::Picture => write_atomic(&self.path, &encode_grey(side, side, values))?,
+            Kind::Picture => {
+                write_atomic(&self.path, &encode_grey(side, side, values, provenance))?
+            }
             Kind::Folder(names) => {
                 let mut folder = OutputDir::create(&self.path)?;
                 for (name, image) in names.iter().zip(values.chunks_exact(side * side)) {
-                    folder.write(name, &encode_grey(side, side, image))?;
+                    folder.write(name, &encode_grey(side, side, image, provenance))?;
                 }
                 folder.commit()?;
             }
@@ -256,15 +307,21 @@ impl StackTarget {
     ///
     /// # Errors
     /// [`StackError::File`] if the images or the picture cannot be written.
-    pub fn write_and_show(&self, side: usize, values: &[f32], title: &str) -> Result<Pictures> {
-        self.write(side, values)?;
+    pub fn write_and_show(
+        &self,
+        side: usize,
+        values: &[f32],
+        title: &str,
+        provenance: &Provenance,
+    ) -> Result<Pictures> {
+        self.write(side, values, provenance)?;
         let name = match self.kind {
             Kind::Folder(_) => self.path.file_name(),
             Kind::Array(_) | Kind::Picture => self.path.file_stem(),
         };
         let name = name.map_or_else(|| "images".into(), |name| name.to_string_lossy());
         let file = self.path.with_file_name(format!("{name}{FOR_PEOPLE}"));
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(provenance);
         let named = file.display().to_string();
         match &self.input {
             Shown::Single(input) => {

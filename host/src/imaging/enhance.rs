@@ -1,11 +1,13 @@
 //! The learned stages for one image: scale to white, fuse with depth, deblur, and make the result
 //! agree with the readings.
 
+use super::readings::KnownReadings;
 use super::white::brightest;
+use nirspi_nets::interval::Readings;
 use nirspi_nets::{
     DepthMaps, Device, Enhancer, Images, ImagesError, Intervals, Known, KnownEstimate,
-    MeasuredRows, MeasuredRowsError, Method, Networks, Options, Sharpener, WeightsError, deblur,
-    fusion,
+    MeasuredRows, MeasuredRowsError, Method, Networks, NoIntervals, Options, Sharpener,
+    WeightsError, deblur, fusion,
 };
 use nirspi_recon::{Image, Rows};
 use thiserror::Error;
@@ -47,6 +49,9 @@ impl White {
 pub struct ImageContext<'c> {
     /// Natural-order Hadamard rows that were measured; `None` means all rows.
     pub rows: Option<&'c Rows>,
+    /// How the readings were taken and the image was made; `None` if that is not known. Without it
+    /// there is no interval.
+    pub readings: Option<KnownReadings>,
     /// Distances of a time-of-flight sensor at the same time: one map.
     pub depth: Option<&'c DepthMaps>,
     /// Least blur, in pixels of the 64 x 64 grid: the blur of the lens at the target's distance.
@@ -110,9 +115,10 @@ pub struct EnhancedImage {
     /// network makes each time is not in this number.
     pub spread: Option<Vec<f32>>,
     /// 64 x 64: half-width of the calibrated 95 % interval of each pixel of the result
-    /// ([`nirspi_nets::interval`]); `None` for an input of 64 x 64 and for other networks than the
-    /// calibrated ones.
+    /// ([`nirspi_nets::interval`]); `None` where the calibration does not reach.
     pub half_width: Option<Vec<f32>>,
+    /// Why there is no interval, in one line.
+    pub no_interval: Option<String>,
 }
 
 /// The learned stages, ready for images of 32 x 32 and 64 x 64.
@@ -120,7 +126,7 @@ pub struct Enhance {
     both: Enhancer,
     second: Sharpener,
     device: Device,
-    intervals: Option<Intervals>,
+    intervals: Result<Intervals, String>,
 }
 
 impl Enhance {
@@ -139,7 +145,8 @@ impl Enhance {
     pub fn by(method: Method, device: &Device) -> Result<Self, WeightsError> {
         let mut networks = Networks::built_in(device.clone());
         let (both, second) = (networks.enhancer(method)?, networks.sharpener(method)?);
-        let intervals = networks.intervals(method, &Options::default()).ok();
+        let intervals = networks.intervals(method, &Options::default());
+        let intervals = intervals.map_err(|error| error.to_string());
         Ok(Self { intervals, ..Self::of(both, second, device.clone()) })
     }
 
@@ -147,7 +154,8 @@ impl Enhance {
     /// 64 x 64. There are no calibrated intervals.
     #[must_use]
     pub fn of(both: Enhancer, second: Sharpener, device: Device) -> Self {
-        Self { both, second, device, intervals: None }
+        let other = "no intervals: the networks are not the calibrated ones".to_owned();
+        Self { both, second, device, intervals: Err(other) }
     }
 
     /// The device on which the networks run.
@@ -196,7 +204,7 @@ impl Enhance {
             self.second.deblur(Images::new(&scaled)?, &options, &mut |_| {})?
         };
         let used = result.estimates[0];
-        let half_width = self.intervals.as_ref().and_then(|intervals| intervals.of(&result).ok());
+        let half_width = self.half_width(&result, white, context);
         let estimated = result.estimated.as_ref().map_or(used, |estimated| estimated[0]);
         Ok(EnhancedImage {
             scaled,
@@ -208,7 +216,28 @@ impl Enhance {
             noise: used.noise,
             inconsistency: result.inconsistency[0],
             spread: result.spread,
-            half_width,
+            no_interval: half_width.as_ref().err().cloned(),
+            half_width: half_width.ok(),
         })
+    }
+
+    /// The half-widths of the intervals, or why there are none.
+    fn half_width(
+        &self,
+        made: &nirspi_nets::Enhanced,
+        white: f32,
+        context: &ImageContext<'_>,
+    ) -> Result<Vec<f32>, String> {
+        let intervals = self.intervals.as_ref().map_err(String::clone)?;
+        let found = match context.readings {
+            Some(KnownReadings { method, noise }) => {
+                let area = fusion::SIDE * fusion::SIDE;
+                let share = context.rows.map_or(1.0, |rows| rows.len() as f32 / area as f32);
+                let noise = noise / white;
+                intervals.of(made, &Readings { method: method.argument(), share, noise })
+            }
+            None => Err(NoIntervals::UnknownReadings),
+        };
+        found.map_err(|error| error.to_string())
     }
 }

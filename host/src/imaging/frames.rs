@@ -2,7 +2,7 @@
 
 use super::{Enhance, EnhanceError, EnhancedImage, ImageContext, Warning, White, warnings};
 use crate::stage_times::StageTimes;
-use nirspi_nets::{Device, WeightsError};
+use nirspi_nets::{DepthMaps, Device, WeightsError};
 use nirspi_recon::{Image, Rows};
 use serde::Serialize;
 use thiserror::Error;
@@ -26,8 +26,7 @@ pub struct FrameReport {
 }
 
 impl FrameReport {
-    fn of(image: &EnhancedImage) -> Self {
-        let warnings = warnings(image);
+    fn of(image: &EnhancedImage, warnings: &[Warning]) -> Self {
         Self {
             white: image.white,
             sigma_px: image.blur_px,
@@ -62,6 +61,26 @@ pub enum FramesError {
     Enhance(#[from] EnhanceError),
 }
 
+/// Enhances the image of a frame that was made from these Hadamard rows, and says whether the result
+/// can be trusted. `white` is the level of a white target in the image's units, and `depth` are
+/// distances at the same time, if a sensor gave some. Every command that enhances a camera's frames
+/// calls this function.
+///
+/// # Errors
+/// As [`Enhance::enhance`].
+pub fn enhance_frame(
+    enhance: &Enhance,
+    image: &Image,
+    rows: &Rows,
+    white: f32,
+    depth: Option<&DepthMaps>,
+) -> Result<(EnhancedImage, Vec<Warning>), EnhanceError> {
+    let known = ImageContext { rows: Some(rows), depth, ..ImageContext::default() };
+    let made = enhance.enhance(image, White::Known(white), &known)?;
+    let doubts = warnings(&made);
+    Ok((made, doubts))
+}
+
 /// Enhances images of 32 x 32 or 64 x 64 pixels, each with the Hadamard rows from which it was
 /// made. Each result is 64 x 64 pixels in [0, 1]. All images have the same white level, the median
 /// of their own levels, so that a video does not flicker.
@@ -91,9 +110,8 @@ pub fn enhance_frames_by(
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     times.time("enhance", || -> Result<(), FramesError> {
         for (image, rows) in frames {
-            let known = ImageContext { rows: Some(rows), ..ImageContext::default() };
-            let mut made = enhance.enhance(image, White::Known(white), &known)?;
-            reports.push(FrameReport::of(&made));
+            let (mut made, warnings) = enhance_frame(enhance, image, rows, white, None)?;
+            reports.push(FrameReport::of(&made, &warnings));
             pixels.append(&mut made.pixels);
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! The report of a reconstruction method, for JSON reports and captions.
 
 use nirspi_recon::omp::Backend;
-use nirspi_recon::reconstruct::{Completion, Method, Report};
+use nirspi_recon::reconstruct::{Method, Report};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use std::fmt;
@@ -40,7 +40,7 @@ impl Serialize for MethodReport {
             device: made.device.as_deref(),
             strength: made.strength,
             sparsity: made.sparsity,
-            keep: made.completion.map(Completion::name),
+            weight_of_readings: made.reading_weight,
             stop: made.stop,
             relative_residual: made.residual,
             unseen_atoms: made.unseen_atoms,
@@ -71,7 +71,7 @@ struct Details<'r> {
     #[serde(skip_serializing_if = "Option::is_none")]
     sparsity: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    keep: Option<&'static str>,
+    weight_of_readings: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     stop: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]

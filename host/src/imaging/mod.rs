@@ -1,7 +1,7 @@
 //! Enhances a reconstructed image, and gives its quality and its warnings.
 //!
 //! ```text
-//! Image (ADC counts) ──white──> [0, 1] ──Enhance──> 64 x 64 in [0, 1] ──> Warning, Quality
+//! Image (ADC counts) ──white──> shares of white ──Enhance──> 64 x 64 in [0, 1] ──> Warning, Quality
 //! ```
 //!
 //! `demo`, `reconstruct`, `capture`, `serve` and `eval` all use this module for the white level,
@@ -14,6 +14,8 @@ mod frames;
 mod method_report;
 mod quality;
 #[cfg(feature = "enhance")]
+mod readings;
+#[cfg(feature = "enhance")]
 mod stack_report;
 #[cfg(feature = "enhance")]
 mod warning;
@@ -22,11 +24,13 @@ mod white;
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COPIES, White};
 #[cfg(feature = "enhance")]
-pub use frames::{FrameReport, FramesError, enhance_frames, enhance_frames_by};
+pub use frames::{FrameReport, FramesError, enhance_frame, enhance_frames, enhance_frames_by};
 pub use method_report::MethodReport;
-pub use quality::{Fit, Fitted, Quality, compare};
+pub use quality::{Fit, Noise, Quality, score};
+#[cfg(feature = "enhance")]
+pub use readings::KnownReadings;
 #[cfg(feature = "enhance")]
 pub use stack_report::{Deblurring, StackReport};
 #[cfg(feature = "enhance")]
 pub use warning::{Warning, warnings};
-pub use white::{SteadyWhite, brightest};
+pub use white::{SteadyWhite, share_of_white};

@@ -1,11 +1,9 @@
 //! Reasons to distrust a picture: one rule for every command, page and file.
 
 use super::EnhancedImage;
+use nirspi_nets::consistency::{CONTRADICTED, is_contradicted};
 use std::fmt;
 
-/// Inconsistency above which the readings contradict the image. An image that agrees with its
-/// readings has 1.1 or less, the radius to which the networks' result is moved.
-const CONTRADICTED: f32 = 1.2;
 /// The largest blur, in pixels of the 64 x 64 grid, for which the networks were trained
 /// (`host/nets/weights/README.md`).
 const TRAINED_BLUR_PX: f32 = 4.2;
@@ -76,7 +74,7 @@ pub fn warnings(image: &EnhancedImage) -> Vec<Warning> {
     // NaN counts as beyond the limit.
     let beyond = |value: f32, limit: f32| value > limit || value.is_nan();
     [
-        beyond(inconsistency, CONTRADICTED).then_some(Warning::Inconsistent { inconsistency }),
+        is_contradicted(inconsistency).then_some(Warning::Inconsistent { inconsistency }),
         beyond(noise, TRAINED_NOISE).then_some(Warning::Dim { noise }),
         beyond(blur_px, TRAINED_BLUR_PX).then_some(Warning::Blurred { blur_px }),
     ]
@@ -101,6 +99,7 @@ mod tests {
             inconsistency,
             spread: None,
             half_width: None,
+            no_interval: None,
         }
     }
 

@@ -4,6 +4,8 @@
 //! pixel alone may be noise. A percentile of all pixels says nothing about a letter on a dark
 //! ground.
 
+use nirspi_recon::Image;
+
 /// The smallest step of white that counts as a change of the scene; a smaller step counts as noise.
 const JUMP: f32 = 0.25;
 /// Share of a small change of white that a [`SteadyWhite`] takes over from each image.
@@ -37,9 +39,17 @@ impl SteadyWhite {
     }
 }
 
+/// The image as shares of white: each pixel divided by the reading of a pixel that sees a white
+/// sheet. Nothing is clamped, so noise stays below 0 and above 1.
+#[must_use]
+pub fn share_of_white(image: &Image, white: f32) -> Image {
+    Image::new(image.side(), image.pixels().iter().map(|&value| value / white).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nirspi_recon::Side;
 
     #[test]
     fn one_bright_pixel_is_not_white_and_four_are() {
@@ -51,6 +61,13 @@ mod tests {
         }
         assert_eq!(brightest(&pixels, 8), 8.0);
         assert_eq!((brightest(&[-1.0; 16], 4), brightest(&[1.0], 1)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn shares_of_white_keep_the_noise_below_black_and_above_white() {
+        let counts = vec![-30.0, 0.0, 150.0, 330.0];
+        let shares = share_of_white(&Image::new(Side::new(2).unwrap(), counts), 300.0);
+        assert_eq!(shares.pixels(), [-0.1, 0.0, 0.5, 1.1]);
     }
 
     #[test]

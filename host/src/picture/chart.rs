@@ -163,7 +163,7 @@ struct Laid {
 }
 
 impl Chart {
-    /// Draws the chart; [`encode_rgb`](crate::files::image::encode_rgb) makes a PNG of it.
+    /// Draws the chart; [`signed_png`](super::signed_png) makes a PNG of it.
     #[must_use]
     pub fn render(&self) -> RgbImage {
         self.render_at(FRAME_PX)

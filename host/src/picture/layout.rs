@@ -9,9 +9,12 @@
 
 use super::bar::{self, draw_bar};
 use super::scale::{PERCENTILES, Range, Scale, Unit};
+use super::scale_bar::{self, draw_scale_bar};
+use super::signature::signed;
 use super::text::{Block, Font, Style};
 use super::{AMBER, BRIGHT, DIM, FRAME, GROUND, MIDDLE};
 use crate::files::image::{Placed, encode_labelled, to_level};
+use crate::provenance::Provenance;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
 
@@ -42,6 +45,9 @@ pub struct Panel {
     pub caption: Vec<String>,
     /// Reasons not to trust the image, below the image in amber.
     pub warnings: Vec<String>,
+    /// Width of what the image shows on the target, for a bar in millimetres below the image;
+    /// `None` for no bar.
+    pub field_mm: Option<f64>,
 }
 
 impl Panel {
@@ -57,6 +63,7 @@ impl Panel {
             unit,
             caption: Vec::new(),
             warnings: Vec::new(),
+            field_mm: None,
         }
     }
 
@@ -121,7 +128,7 @@ impl From<Panel> for SideBySide {
 }
 
 impl SideBySide {
-    /// Draws the picture; [`encode_rgb`](crate::files::image::encode_rgb) makes a PNG of it.
+    /// Draws the picture without its provenance; [`signed_png`](super::signed_png) makes a PNG of it.
     ///
     /// # Panics
     /// If there is no panel, or a panel does not have exactly `width * height` values, at least
@@ -137,15 +144,15 @@ impl SideBySide {
         self.draw(panel_px).0
     }
 
-    /// The picture as a PNG. Readers of this program find the image of a single panel in the
-    /// picture, and refuse a picture of several.
+    /// The picture as a PNG, with its provenance below it. Readers of this program find the image of
+    /// a single panel in the picture, and refuse a picture of several.
     ///
     /// # Panics
     /// As [`render`](Self::render).
     #[must_use]
-    pub fn png(&self) -> Vec<u8> {
+    pub fn png(&self, provenance: &Provenance) -> Vec<u8> {
         let (picture, placed) = self.draw(PANEL_PX);
-        encode_labelled(&picture, self.panels.len(), placed)
+        encode_labelled(&signed(&picture, provenance), self.panels.len(), placed, provenance)
     }
 
     /// Rows of the picture.
@@ -176,7 +183,9 @@ impl SideBySide {
 
         let title_top = MARGIN_PX + header.height_and(18);
         let image_top = title_top + spaced(tallest(&titles), 10);
-        let bar_top = image_top + edge + 12;
+        let has_length = self.panels.iter().any(|panel| panel.field_mm.is_some());
+        let length_top = image_top + edge + 6;
+        let bar_top = length_top + if has_length { scale_bar::HEIGHT_PX } else { 0 } + 6;
         let range_top = bar_top + bar::HEIGHT_PX + 4;
         let warning_top = range_top + spaced(tallest(&ranges), 8);
         let caption_top = warning_top + spaced(tallest(&warnings), 8);
@@ -194,6 +203,7 @@ impl SideBySide {
             captions,
             footer,
             image_top,
+            length_top,
             bar_top,
             range_top,
             warning_top,
@@ -220,6 +230,9 @@ impl SideBySide {
             draw_image(&mut canvas, panel, scale, (wide, high), (x, y));
             if self.panels.len() == 1 {
                 placed = panel.placed(scale, (wide, high), (x, y));
+            }
+            if let Some(field_mm) = panel.field_mm {
+                draw_scale_bar(&mut canvas, field_mm, wide, (x, laid.length_top));
             }
             draw_bar(&mut canvas, scale, (left, laid.bar_top), laid.edge);
             laid.ranges[column].draw(&mut canvas, left, laid.range_top);
@@ -264,6 +277,7 @@ struct Laid {
     captions: Vec<Block>,
     footer: Block,
     image_top: u32,
+    length_top: u32,
     bar_top: u32,
     range_top: u32,
     warning_top: u32,
@@ -385,7 +399,27 @@ mod tests {
             unit: Unit::OfWhite,
             caption: caption.iter().map(|&line| line.to_owned()).collect(),
             warnings: Vec::new(),
+            field_mm: None,
         }
+    }
+
+    #[test]
+    fn images_of_one_field_have_bars_of_one_length() {
+        let with = |side: usize, field_mm| Panel { field_mm, ..panel("", side, &[]) };
+        let bars = |panels: Vec<Panel>| {
+            let picture = side_by_side("", panels, "");
+            let canvas = picture.render();
+            let y = picture.lay(PANEL_PX).length_top + scale_bar::HEIGHT_PX / 2;
+            let lit = |from: u32| {
+                // The label begins after a gap.
+                (from..).take_while(|&x| *canvas.get_pixel(x, y) == MIDDLE).count()
+            };
+            [0, 1].map(|column| lit(MARGIN_PX + column * (PANEL_PX + GAP_PX)))
+        };
+        // 20 of 96 mm in 384 pixels.
+        assert_eq!(bars(vec![with(32, Some(96.0)), with(64, Some(96.0))]), [80, 80]);
+        let height = |field_mm| side_by_side("", vec![with(32, field_mm)], "").render().height();
+        assert_eq!(height(Some(96.0)), height(None) + scale_bar::HEIGHT_PX);
     }
 
     #[test]

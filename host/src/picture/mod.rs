@@ -2,8 +2,8 @@
 //! source; contact sheets and videos of many images; charts.
 //!
 //! All of them have one look: light text on an opaque dark ground, which is readable on a white and
-//! on a black page. Images are stretched between [`PERCENTILES`], and the range is on the picture
-//! and in the report ([`Pictures`]).
+//! on a black page. Images are stretched between [`PERCENTILES`] unless they share one scale, and the
+//! range is on the picture and in the report ([`Pictures`]). A flat image is drawn in its own grey.
 //!
 //! # Invariant
 //! All text stays inside its panel, whatever its length
@@ -19,7 +19,9 @@ mod chart;
 mod layout;
 mod report;
 mod scale;
+mod scale_bar;
 mod sheet;
+mod signature;
 mod terminal;
 mod text;
 mod ticks;
@@ -31,8 +33,11 @@ pub use layout::{Panel, SideBySide, below, beside, blank, stacked};
 pub use report::Pictures;
 pub use scale::{PERCENTILES, Range, Scale, Unit};
 pub use sheet::Sheet;
+pub use signature::signed_png;
 pub use terminal::{Tones, half_blocks};
 pub(crate) use video::of_images as video;
+
+pub use image::RgbImage;
 
 use image::Rgb;
 

@@ -10,15 +10,21 @@ use super::sheet::Sheet;
 use super::video;
 use crate::files::FileError;
 use crate::files::output::{OutputDir, write_atomic};
+use crate::provenance::Provenance;
 use nirspi_recon::Image;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
 
-/// Pictures that are drawn but not yet written. As JSON: each file with the ranges of its images.
-#[derive(Debug, Clone, Default, Serialize)]
+/// Pictures that are drawn but not yet written, all of one provenance. As JSON: each file with the
+/// ranges of its images.
+#[derive(Debug, Clone, Serialize)]
 #[serde(transparent)]
-pub struct Pictures(Vec<Entry>);
+pub struct Pictures {
+    entries: Vec<Entry>,
+    #[serde(skip)]
+    provenance: Provenance,
+}
 
 #[derive(Debug, Clone, Serialize)]
 struct Entry {
@@ -44,6 +50,18 @@ struct Shown {
 }
 
 impl Pictures {
+    /// No picture yet.
+    #[must_use]
+    pub fn new(provenance: &Provenance) -> Self {
+        Self { entries: Vec::new(), provenance: provenance.clone() }
+    }
+
+    /// The provenance of all pictures.
+    #[must_use]
+    pub fn provenance(&self) -> &Provenance {
+        &self.provenance
+    }
+
     /// Draws panels side by side.
     ///
     /// # Panics
@@ -52,13 +70,13 @@ impl Pictures {
         let shown = |panel: &Panel| Shown { title: panel.title.clone(), scale: panel.scale() };
         let count = picture.panels.len();
         let stretched = picture.panels.iter().any(|panel| panel.range == Range::Stretched);
-        self.0.push(Entry {
+        self.entries.push(Entry {
             file: file.to_owned(),
             shown: count,
             of: count,
             percentiles: stretched.then_some(PERCENTILES),
             images: picture.panels.iter().map(shown).collect(),
-            bytes: picture.png(),
+            bytes: picture.png(&self.provenance),
         });
     }
 
@@ -83,8 +101,13 @@ impl Pictures {
     /// The pictures of a reconstruction: `image.png`, and `enhanced.png` of the enhanced image in
     /// `[0, 1]` with its warnings, if there is one.
     #[must_use]
-    pub fn of_image(image: &Image, unit: Unit, enhanced: Option<(&[f32], Vec<String>)>) -> Self {
-        let mut pictures = Self::default();
+    pub fn of_image(
+        image: &Image,
+        unit: Unit,
+        enhanced: Option<(&[f32], Vec<String>)>,
+        provenance: &Provenance,
+    ) -> Self {
+        let mut pictures = Self::new(provenance);
         let side = image.side().pixels();
         let panel = Panel::square("reconstructed", side, image.pixels(), unit);
         pictures.single("image.png", panel);
@@ -106,8 +129,9 @@ impl Pictures {
         images: &[Image],
         unit: Unit,
         enhanced: Option<(&[f32], Vec<usize>)>,
+        provenance: &Provenance,
     ) -> Self {
-        let mut pictures = Self::default();
+        let mut pictures = Self::new(provenance);
         let header = format!("{header}, {} frames", images.len());
         let side = images[0].side().pixels();
         let values = images.iter().map(Image::pixels).collect();
@@ -124,14 +148,14 @@ impl Pictures {
 
     /// Draws a contact sheet.
     pub fn sheet(&mut self, file: &str, sheet: &Sheet<'_>) {
-        let bytes = sheet.png();
+        let bytes = sheet.png(&self.provenance);
         self.many(file, sheet, sheet.shown().len(), bytes);
     }
 
     /// Draws a contact sheet, `NAME.png`, and the same images as a video, `NAME.apng`.
     pub fn sheet_and_video(&mut self, name: &str, sheet: &Sheet<'_>) {
         self.sheet(&format!("{name}.png"), sheet);
-        let video = video::encode(sheet);
+        let video = video::encode(sheet, &self.provenance);
         self.many(&format!("{name}.apng"), sheet, video.frames, video.bytes);
     }
 
@@ -139,7 +163,7 @@ impl Pictures {
         let of_scale = |(title, scale)| Shown { title, scale };
         let images = sheet.scales().into_iter().map(of_scale).collect();
         let (file, of) = (file.to_owned(), sheet.count());
-        self.0.push(Entry { file, shown, of, percentiles: Some(PERCENTILES), images, bytes });
+        self.entries.push(Entry { file, shown, of, percentiles: Some(PERCENTILES), images, bytes });
     }
 
     /// Stages the files in a folder.
@@ -147,7 +171,7 @@ impl Pictures {
     /// # Errors
     /// [`FileError`] names the file and the system's reason.
     pub fn write(&self, out: &mut OutputDir) -> Result<(), FileError> {
-        self.0.iter().try_for_each(|entry| out.write(&entry.file, &entry.bytes))
+        self.entries.iter().try_for_each(|entry| out.write(&entry.file, &entry.bytes))
     }
 
     /// Writes the files, whose names are paths here.
@@ -155,14 +179,14 @@ impl Pictures {
     /// # Errors
     /// [`FileError`] names the file and the system's reason.
     pub fn write_files(&self) -> Result<(), FileError> {
-        self.0.iter().try_for_each(|entry| write_atomic(Path::new(&entry.file), &entry.bytes))
+        self.entries.iter().try_for_each(|entry| write_atomic(Path::new(&entry.file), &entry.bytes))
     }
 }
 
 /// The files in words, with what each leaves out.
 impl fmt::Display for Pictures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (k, Entry { file, shown, of, .. }) in self.0.iter().enumerate() {
+        for (k, Entry { file, shown, of, .. }) in self.entries.iter().enumerate() {
             let comma = if k == 0 { "" } else { ", " };
             write!(f, "{comma}{file}")?;
             if shown < of {
@@ -176,10 +200,11 @@ impl fmt::Display for Pictures {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::provenance::tests::provenance;
 
     #[test]
     fn the_range_of_every_picture_is_in_the_report() {
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(&provenance());
         let mut values = vec![1.0; 1024];
         values[..100].fill(-2.0);
         values[7] = 99.0;
@@ -201,7 +226,7 @@ mod tests {
         let values: Vec<f32> = (0..100 * 16).map(|p| (p % 16) as f32).collect();
         let images = values.chunks_exact(16).collect();
         let sheet = Sheet::new("frames".to_owned(), 4, images, Unit::Readings);
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(&provenance());
         pictures.sheet_and_video("image", &sheet);
         assert_eq!(pictures.to_string(), "image.png (64 of 100 frames), image.apng");
         let report = serde_json::to_value(&pictures).unwrap();

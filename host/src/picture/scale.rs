@@ -4,6 +4,8 @@
 //! A brighter pixel is never drawn darker, and every grey level is in `[0, 1]`
 //! (`tests::levels_are_bounded_and_in_the_order_of_the_values`). Half a per cent of the pixels at
 //! each end cannot take the contrast from the others (`tests::a_bright_speck_leaves_the_contrast`).
+//! An image whose values hardly differ is drawn in its own grey, not stretched to black and white
+//! (`tests::a_flat_image_is_drawn_in_its_own_grey`).
 
 use super::ticks::number;
 use serde::{Serialize, Serializer};
@@ -11,6 +13,10 @@ use std::fmt;
 
 /// The percentiles that are black and white in a stretched picture.
 pub const PERCENTILES: [f64; 2] = [0.5, 99.5];
+
+/// A stretched image whose values differ by less than this share of white is shown on the whole
+/// scale from black to white.
+const FLAT: f32 = 0.1;
 
 /// The unit of an image's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,7 +72,8 @@ impl Serialize for Unit {
 pub enum Range {
     /// 0 is black and 1 is white, so that images of one picture can be compared.
     Unit,
-    /// The [`PERCENTILES`] of the image's own values are black and white.
+    /// The [`PERCENTILES`] of the image's own values are black and white. An image in shares of
+    /// white that is nearly flat has 0 as black and 1 as white.
     Stretched,
     /// These values are black and white.
     Fixed(f32, f32),
@@ -108,17 +115,23 @@ impl Scale {
                     sorted.get(at).copied().unwrap_or(0.0)
                 });
                 // An image of a few specks alone is shown by its ends.
-                if high > low { (low, high) } else { (least, most) }
+                let (low, high) = if high > low { (low, high) } else { (least, most) };
+                let is_flat = unit.is_fraction() && high - low < FLAT && !sorted.is_empty();
+                if is_flat { (low.min(0.0), high.max(1.0)) } else { (low, high) }
             }
         };
         Self { unit, black, white, least, most }
     }
 
-    /// The grey level of a value, 0 to 1. NaN is black, and so is an image of one value.
+    /// The grey level of a value, 0 to 1. NaN is black. An image of one value in a unit without a
+    /// white level is half grey, and black if the value is 0.
     #[must_use]
     pub fn level(&self, value: f32) -> f32 {
         let span = f64::from(self.white) - f64::from(self.black);
         let above = f64::from(value) - f64::from(self.black);
+        if span == 0.0 && above == 0.0 && value != 0.0 {
+            return 0.5;
+        }
         if span > 0.0 && above > 0.0 { (above / span).min(1.0) as f32 } else { 0.0 }
     }
 
@@ -170,9 +183,22 @@ mod tests {
     }
 
     #[test]
-    fn an_image_of_one_value_is_black_and_one_of_a_few_specks_shows_them() {
+    fn a_flat_image_is_drawn_in_its_own_grey() {
+        for unit in [Unit::OfWhite, Unit::Reflectance] {
+            for (value, noise) in [(0.0, 0.0), (0.4, 0.0), (0.9, 0.0), (0.9, 0.04), (1.2, 0.0)] {
+                let values = (0..1024).map(|p| value + if p % 2 == 0 { noise } else { -noise });
+                let scale = Scale::of(Range::Stretched, unit, values);
+                let expected = (value / value.max(1.0)).min(1.0);
+                assert!((scale.level(value) - expected).abs() < 0.04, "{value}: {scale:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_image_of_one_value_without_a_white_is_grey_and_a_few_specks_show() {
         let flat = stretched(&[3.0; 1024]);
-        assert_eq!((flat.level(3.0), flat.line()), (0.0, "ADC counts: 3 to 3".to_owned()));
+        assert_eq!((flat.level(3.0), flat.line()), (0.5, "ADC counts: 3 to 3".to_owned()));
+        assert_eq!(stretched(&[0.0; 1024]).level(0.0), 0.0);
         let mut specks = vec![0.0; 1024];
         specks[17] = 5.0;
         assert_eq!(stretched(&specks).level(5.0), 1.0);

@@ -7,10 +7,12 @@
 use super::bar::{self, draw_bar};
 use super::layout::{FOOTER, HEADER, WARNING, spaced, stretch_words};
 use super::scale::{Range, Scale, Unit};
+use super::signature::signed;
 use super::text::{Block, Font, Style};
 use super::ticks::number;
 use super::{AMBER, FRAME, GROUND, MIDDLE};
 use crate::files::image::{encode_labelled, to_level};
+use crate::provenance::Provenance;
 use image::{Rgb, RgbImage};
 
 /// Number of images in a row.
@@ -124,10 +126,11 @@ impl<'a> Sheet<'a> {
         self.warned.contains(&index)
     }
 
-    /// The sheet as a PNG, which this program's readers refuse as an image.
+    /// The sheet as a PNG with its provenance, which this program's readers refuse as an image.
     #[must_use]
-    pub fn png(&self) -> Vec<u8> {
-        encode_labelled(&self.render(), self.images.len(), None)
+    pub fn png(&self, provenance: &Provenance) -> Vec<u8> {
+        let picture = signed(&self.render(), provenance);
+        encode_labelled(&picture, self.images.len(), None, provenance)
     }
 
     /// What is shown of how many, and on which scale.

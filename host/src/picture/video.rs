@@ -7,6 +7,9 @@
 use super::layout::{Panel, SideBySide};
 use super::scale::{Range, Unit};
 use super::sheet::{Sheet, evenly};
+use super::signature::signed;
+use crate::files::image::sign;
+use crate::provenance::Provenance;
 use image::{GenericImageView, RgbImage, imageops};
 use nirspi_recon::Image;
 
@@ -25,20 +28,22 @@ pub(super) struct Video {
 ///
 /// # Panics
 /// If there is no image.
-pub(super) fn encode(sheet: &Sheet<'_>) -> Video {
+pub(super) fn encode(sheet: &Sheet<'_>, provenance: &Provenance) -> Video {
     let shown = evenly(sheet.count(), MOST);
     let pictures: Vec<SideBySide> = shown.iter().map(|&index| frame(sheet, index)).collect();
     // The text below an image may be longer than that of another.
     let height = pictures.iter().map(SideBySide::height).max().unwrap_or(1);
     let mut bytes = Vec::new();
     let encoded = (|| {
-        let mut pictures = pictures.iter().map(|picture| padded(picture.render(), height));
+        let drawn = |picture: &SideBySide| signed(&padded(picture.render(), height), provenance);
+        let mut pictures = pictures.iter().map(drawn);
         let mut before = pictures.next().unwrap_or_else(|| RgbImage::new(1, 1));
         let mut encoder = png::Encoder::new(&mut bytes, before.width(), before.height());
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_animated(shown.len() as u32, 0)?;
         encoder.set_frame_delay(1, RATE_HZ)?;
+        sign(&mut encoder, provenance)?;
         let mut writer = encoder.write_header()?;
         writer.write_image_data(before.as_raw())?;
         for picture in pictures {
@@ -59,10 +64,15 @@ pub(super) fn encode(sheet: &Sheet<'_>) -> Video {
 }
 
 /// The bytes of a video of these images, all on one scale. There must be at least one image.
-pub(crate) fn of_images(header: &str, images: &[Image], unit: Unit) -> Vec<u8> {
+pub(crate) fn of_images(
+    header: &str,
+    images: &[Image],
+    unit: Unit,
+    provenance: &Provenance,
+) -> Vec<u8> {
     let side = images.first().map_or(1, |image| image.side().pixels());
     let values = images.iter().map(Image::pixels).collect();
-    encode(&Sheet::new(header.to_owned(), side, values, unit)).bytes
+    encode(&Sheet::new(header.to_owned(), side, values, unit), provenance).bytes
 }
 
 fn frame(sheet: &Sheet<'_>, index: usize) -> SideBySide {
@@ -108,6 +118,7 @@ fn changed(before: &RgbImage, after: &RgbImage) -> (u32, u32, u32, u32) {
 mod tests {
     use super::super::scale::Unit;
     use super::*;
+    use crate::provenance::tests::provenance;
     use image::codecs::png::PngDecoder;
     use image::{AnimationDecoder, DynamicImage};
     use std::io::Cursor;
@@ -121,7 +132,7 @@ mod tests {
             .collect();
         let images: Vec<&[f32]> = images.iter().map(Vec::as_slice).collect();
         let sheet = Sheet::new(String::new(), 8, images, Unit::AdcCounts);
-        let video = encode(&sheet);
+        let video = encode(&sheet, &provenance());
         assert_eq!(video.frames, 4);
         let frames = PngDecoder::new(Cursor::new(&video.bytes)).unwrap().apng().unwrap();
         let frames = frames.into_frames().collect_frames().unwrap();

@@ -6,7 +6,8 @@ use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
 use crate::imaging::{FrameReport, FramesError, MethodReport, enhance_frames};
 use crate::picture::{Pictures, Unit};
-use crate::source::{Part, Source};
+use crate::provenance::Made;
+use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, metrics};
@@ -24,6 +25,8 @@ pub struct OneImage<'r> {
     pub enhance: bool,
     /// Folder for the results.
     pub out: &'r Path,
+    /// The program, for the provenance of the results.
+    pub made: &'r Made,
 }
 
 /// Readings that were lost.
@@ -57,6 +60,8 @@ pub struct OneReport {
     pub method: MethodReport,
     /// Readings that were lost.
     pub dropouts: Vec<DropoutReport>,
+    /// Readings that light cannot have given, whose patterns are left out.
+    pub outliers: Vec<OutlierReport>,
     /// Positions in the order shown of patterns that the file marks as not read.
     pub not_read: Vec<usize>,
     /// The part of complex readings in image.npy.
@@ -71,6 +76,8 @@ pub struct OneReport {
     /// What the networks report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub enhancement: Option<FrameReport>,
+    /// What contradicts the readings.
+    pub warnings: Vec<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
     /// What is black and white in the pictures.
@@ -99,6 +106,7 @@ impl OneReport {
                 count_of(dropout.rows.len(), "pattern")
             )
         }));
+        lines.extend(self.outliers.iter().map(OutlierReport::to_string));
         lines.extend((!self.not_read.is_empty()).then(|| not_read_words(&self.not_read)));
         lines.extend(self.frames.map(|frames| format!("frames: {frames}")));
         lines.push(self.method.to_string());
@@ -109,6 +117,7 @@ impl OneReport {
             lines.push(enhancement.line());
             lines.extend(enhancement.warnings.iter().map(|warning| format!("warning: {warning}")));
         }
+        lines.extend(self.warnings.iter().map(|warning| format!("warning: {warning}")));
         lines
     }
 }
@@ -162,8 +171,9 @@ pub fn one_image(
         readings: d.length,
         rows: d.rows,
     });
+    let provenance = source.taken.made(request.made);
     let report = OneReport {
-        pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short)),
+        pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short), &provenance),
         input: request.input.to_owned(),
         n: side,
         measurements: source.measurements.rows().len(),
@@ -172,11 +182,13 @@ pub fn one_image(
         order,
         method,
         dropouts: dropouts.collect(),
+        outliers: source.outliers.iter().map(OutlierReport::of).collect(),
         not_read: source.not_read,
         part: parts.as_ref().map(|_| Part::Magnitude.name()),
         frames: source.frames,
         correlation_with_files_recon: correlation,
         enhancement,
+        warnings: source.warnings,
         notes: source.notes,
         stage_ms: times,
     };
@@ -185,7 +197,7 @@ pub fn one_image(
 }
 
 /// Writes an image, the real and imaginary part of a complex image, the enhanced image, if there is
-/// one, the pictures, and the report.
+/// one, the pictures, and the report with the provenance of the pictures.
 ///
 /// # Errors
 /// [`FileError`] names the file. Nothing is left behind.
@@ -208,8 +220,8 @@ pub fn write_image(
         out.write("enhanced.npy", &npy::encode(&[side, side], sharp))?;
     }
     pictures.write(&mut out)?;
-    let text = serde_json::to_string_pretty(report).unwrap_or_default();
-    out.write("report.json", format!("{text}\n").as_bytes())?;
+    let text = pictures.provenance().sign(report).unwrap_or_default();
+    out.write("report.json", text.as_bytes())?;
     out.commit()?;
     Ok(())
 }

@@ -7,6 +7,7 @@ use super::{
     reader::checksum,
 };
 use crate::calibration::Settling;
+use crate::provenance::{KEY, Provenance};
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use crate::tally::Tally;
@@ -30,6 +31,8 @@ pub(crate) struct Opening<'o> {
     pub(crate) settling: Option<&'o Settling>,
     /// The number of the run whose frames count.
     pub(crate) run: Option<u16>,
+    /// The provenance of an export; a recording is the readings themselves.
+    pub(crate) provenance: Option<&'o Provenance>,
 }
 
 /// The records of a recording.
@@ -64,6 +67,7 @@ impl<W: Write> Book<W> {
         let mut parts = vec![part(IDENTITY, opening.identity)?, part(SETUP, opening.setup)?];
         parts.extend(opening.settling.map(|settling| part(SETTLING, settling)).transpose()?);
         parts.extend(opening.run.map(|run| part(RUN, &run)).transpose()?);
+        parts.extend(opening.provenance.map(|made| part(KEY, made)).transpose()?);
         let begun = || -> Result<_, McapError> {
             let mut writer = options.create(NoSeek::new(to))?;
             let none = BTreeMap::new();

@@ -51,7 +51,7 @@ impl Recorder {
     ) -> io::Result<Self> {
         let (place, file) = Place::make(target)?;
         let begun = file.try_clone().and_then(|clone| {
-            let opening = Opening { identity, setup, settling, run };
+            let opening = Opening { identity, setup, settling, run, provenance: None };
             let (spool, disk) = spool::start(clone)?;
             let book = Book::begin(spool, &opening)?;
             disk.settle()?;

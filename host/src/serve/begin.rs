@@ -14,7 +14,7 @@ use crate::setup::MeasurementSetup;
 use crate::virtual_camera::{ShotError, VirtualOpticsError};
 use nirspi_nets::Device;
 use nirspi_optics::CameraModel;
-use nirspi_recon::reconstruct::{Method, MethodSettings};
+use nirspi_recon::reconstruct::Method;
 use nirspi_recon::{Order, RowsError};
 use thiserror::Error;
 
@@ -86,9 +86,7 @@ impl Turns {
         source: CameraSource,
         line: Option<Line>,
     ) -> Result<Self, TurnsError> {
-        let network = Some(nirspi_nets::prior::shipped());
-        let methods = MethodSettings { network, ..MethodSettings::default() };
-        let imaging = Imaging::new(&methods, Device::cpu())?;
+        let imaging = Imaging::new(&nirspi_nets::prior::settings(), Device::cpu())?;
         let settings = Settings::new(Method::default(), 64, &source.setup);
         Self::new(source, imaging, settings, line).map_err(TurnsError::Camera)
     }

@@ -47,7 +47,7 @@ pub struct CameraState {
     line: String,
     /// What is known of the LEDs.
     pub leds: Leds,
-    identity: CameraIdentity,
+    pub(super) identity: CameraIdentity,
     versions: Vec<Part>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measurement: Option<Measurement>,

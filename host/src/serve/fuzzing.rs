@@ -97,7 +97,8 @@ impl Still {
         }));
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.expect("a runtime");
-        let bind = |token| Server::bind("127.0.0.1:0", token).expect("a port");
+        let made = crate::provenance::Made::by("fuzzing", None, ["fuzzing"], 0);
+        let bind = |token| Server::bind("127.0.0.1:0", token, &made).expect("a port");
         let open = bind(None).with_foxglove("0").expect("a port");
         let guarded = bind(Some(TOKEN.parse::<Token>().expect("a token")));
         let viewers = open.foxglove.as_ref().map_or(open.address, |viewers| viewers.address);

@@ -13,10 +13,11 @@ use super::imaging::Picture;
 use super::server::Server;
 use super::state::Published;
 use super::token::{self, Token};
-use super::{Shared, commands, foxglove, guard, page};
+use super::{Shared, commands, foxglove, guard, lock, page};
 use crate::causes::printable;
 use crate::files::image::encode_grey;
 use crate::files::npy;
+use crate::provenance::{Made, Taken};
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State};
@@ -69,6 +70,7 @@ pub struct App {
     pub published: watch::Receiver<Arc<Published>>,
     pub listen: SocketAddr,
     pub token: Option<Token>,
+    pub made: Made,
 }
 
 /// Serves until `is_over`. Open requests are then cut off, because the page detects the end of the
@@ -101,8 +103,8 @@ pub(super) fn routers(
     shared: &Arc<Shared>,
     published: &watch::Receiver<Arc<Published>>,
 ) -> Vec<(TcpListener, Router)> {
-    let Server { listener, token, address: listen, foxglove } = server;
-    let app = App { shared: Arc::clone(shared), published: published.clone(), listen, token };
+    let Server { listener, token, made, address: listen, foxglove } = server;
+    let app = App { shared: Arc::clone(shared), published: published.clone(), listen, token, made };
     let mut routers = Vec::new();
     if let Some(foxglove) = foxglove {
         let Server { listener, token, address: listen, .. } = *foxglove;
@@ -225,12 +227,12 @@ async fn state(State(app): State<App>) -> Response {
 
 async fn image(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    png(fusion::SIDE, picture.map(|picture| picture.shares_of_white()).as_deref())
+    png(&app, fusion::SIDE, picture.map(|picture| picture.shares_of_white()).as_deref())
 }
 
 async fn enhanced(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    png(deblur::SIDE, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
+    png(&app, deblur::SIDE, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
 }
 
 /// ADC counts.
@@ -249,9 +251,11 @@ fn no_image() -> Response {
     line(StatusCode::SERVICE_UNAVAILABLE, &"there is no such image now")
 }
 
-fn png(side: usize, pixels: Option<&[f32]>) -> Response {
+fn png(app: &App, side: usize, pixels: Option<&[f32]>) -> Response {
     let Some(pixels) = pixels else { return no_image() };
-    ([(header::CONTENT_TYPE, "image/png")], encode_grey(side, side, pixels)).into_response()
+    let provenance = Taken::by(&lock(&app.shared.camera).camera.identity).made(&app.made);
+    let png = encode_grey(side, side, pixels, &provenance);
+    ([(header::CONTENT_TYPE, "image/png")], png).into_response()
 }
 
 fn numbers(side: usize, pixels: Option<&[f32]>) -> Response {

@@ -8,11 +8,10 @@ use super::moving::Moving;
 use super::settings::{Offer, Settings, alternatives};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
+use crate::calibration::FlatField;
 use crate::causes;
 use crate::clock::{self, Instant};
-use crate::imaging::{
-    Enhance, EnhanceError, ImageContext, SteadyWhite, Warning, White, brightest, warnings,
-};
+use crate::imaging::{Enhance, EnhanceError, SteadyWhite, Warning, White, enhance_frame};
 use crate::integrate::IntegrateError;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
@@ -381,31 +380,23 @@ impl Imaging {
         let method = self.method(settings)?;
         let Reconstruction { image, report } =
             moving.image(method, &measurements, look, settings)?;
-        let image = match &look.run.flat_field {
-            Some(flat) => flat.correct(&image),
-            None => image,
-        };
+        let image = FlatField::corrected(look.run.flat_field.as_ref(), image);
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
             return Err(PictureError::NotFinite);
         }
         shared.passed(Passed::Reconstructed, look.arrived);
-        let white_counts = white.follow(brightest(image.pixels(), side));
+        let white_counts = white.follow(White::Brightest.level(&image));
         let frame_warnings = look.sum.warnings();
         let mut all: Vec<String> = frame_warnings.iter().map(|&text| text.to_owned()).collect();
         let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
         let mut half_width = None;
         if settings.enhance && white_counts > 0.0 {
             let started = Instant::now();
-            let known = ImageContext {
-                rows: Some(measurements.rows()),
-                depth: look.depth.as_ref().map(|depth| &depth.map),
-                ..ImageContext::default()
-            };
-            let made =
-                self.enhance(settings)?.enhance(&image, White::Known(white_counts), &known)?;
-            let doubts = warnings(&made);
+            let depth = look.depth.as_ref().map(|depth| &depth.map);
+            let (enhance, rows) = (self.enhance(settings)?, measurements.rows());
+            let (made, doubts) = enhance_frame(enhance, &image, rows, white_counts, depth)?;
             short.extend(doubts.iter().map(Warning::short));
             all.extend(doubts.iter().map(Warning::to_string));
             enhancement = Some(Enhancement {

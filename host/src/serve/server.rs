@@ -1,6 +1,7 @@
 //! Where the page is served, and who may open it.
 
 use super::token::{Token, TokenError};
+use crate::provenance::Made;
 use std::fmt::Display;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -25,24 +26,26 @@ pub struct Server {
     pub(super) foxglove: Option<Box<Server>>,
     pub(super) listener: TcpListener,
     pub(super) token: Option<Token>,
+    /// The program, for the provenance of pictures that a browser asks for.
+    pub(super) made: Made,
     /// Where the server listens.
     pub(super) address: SocketAddr,
 }
 
 impl Server {
     /// Listens at `address`, `host:port`. A server that other machines reach demands a token: the
-    /// given one, or a random one.
+    /// given one, or a random one. `made` is the program, for the provenance of its pictures.
     ///
     /// # Errors
     /// [`BindError`].
-    pub fn bind(address: &str, token: Option<Token>) -> Result<Self, BindError> {
+    pub fn bind(address: &str, token: Option<Token>, made: &Made) -> Result<Self, BindError> {
         let listener = TcpListener::bind(address)?;
         let address = listener.local_addr()?;
         let token = match token {
             None if !address.ip().is_loopback() => Some(Token::random()?),
             token => token,
         };
-        Ok(Self { listener, token, address, foxglove: None })
+        Ok(Self { listener, token, made: made.clone(), address, foxglove: None })
     }
 
     /// Also listens for viewers such as Foxglove: at a port beside the page, or at `host:port`. The
@@ -56,7 +59,7 @@ impl Server {
             Ok(port) => SocketAddr::new(self.address.ip(), port).to_string(),
             Err(_) => place.to_owned(),
         };
-        self.foxglove = Some(Box::new(Self::bind(&address, self.token.clone())?));
+        self.foxglove = Some(Box::new(Self::bind(&address, self.token.clone(), &self.made)?));
         Ok(self)
     }
 

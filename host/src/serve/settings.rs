@@ -122,7 +122,8 @@ pub struct Change {
     pub frames: Option<u32>,
     /// Another order of patterns. The run starts again.
     pub order: Option<String>,
-    /// Another share of the patterns. The run starts again.
+    /// Another share of the patterns. The run starts again. Without `sweeps`, the light of a frame
+    /// stays the same.
     pub sampling: Option<f64>,
     /// Another number of sweeps in one frame. The run starts again.
     pub sweeps: Option<u32>,
@@ -295,7 +296,12 @@ impl Measuring {
         if Sampling::new(sampling).is_err() {
             return Err(ChangeError::Sampling { found: sampling });
         }
-        let sweeps = change.sweeps.unwrap_or(self.sweeps);
+        // Another share of the patterns gets the same light: its sweeps are shorter or longer.
+        let patterns = |share: f64| (share * Side::INSTRUMENT.area() as f64).round().max(1.0);
+        let as_long = f64::from(self.sweeps) * patterns(self.sampling) / patterns(sampling);
+        let as_long = (as_long.round() as u32).clamp(1, MAX_SWEEPS);
+        let sweeps =
+            change.sweeps.unwrap_or(if sampling == self.sampling { self.sweeps } else { as_long });
         // A command line may ask for more.
         if sweeps != self.sweeps && !(1..=MAX_SWEEPS).contains(&sweeps) {
             return Err(ChangeError::Sweeps { found: sweeps });
@@ -372,6 +378,22 @@ pub(super) mod tests {
         assert_eq!(all, Ok(expected.clone()));
         let auto = Change::parse(br#"{"strength": "auto"}"#).unwrap();
         assert_eq!(expected.with(&auto, &offer()).unwrap().strength, None);
+    }
+
+    #[test]
+    fn another_share_of_the_patterns_keeps_the_light_of_a_frame() {
+        let sweeps = |from: &Settings, json: &str| {
+            from.with(&Change::parse(json.as_bytes()).unwrap(), &offer()).unwrap()
+        };
+        let all = sweeps(&settings(), r#"{"sampling": 1, "sweeps": 1}"#);
+        let few = sweeps(&all, r#"{"sampling": 0.02}"#);
+        assert_eq!(few.measuring.sweeps, 51, "51 sweeps of 20 patterns");
+        assert_eq!(sweeps(&few, r#"{"sampling": 1}"#).measuring.sweeps, 1);
+        let half = sweeps(&all, r#"{"sampling": 0.5}"#);
+        assert_eq!(half.measuring.sweeps, 2);
+        assert_eq!(sweeps(&half, r#"{"sampling": 1}"#).measuring.sweeps, 1);
+        assert_eq!(sweeps(&half, r#"{"sampling": 0.25, "sweeps": 3}"#).measuring.sweeps, 3);
+        assert_eq!(sweeps(&half, r#"{"order": "zig-zag"}"#).measuring.sweeps, 2);
     }
 
     #[test]

@@ -329,7 +329,11 @@ impl Paper {
     fn with_token(token: Option<Token>) -> Self {
         let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
         let (publish, published) = watch::channel(Arc::new(Published::default()));
-        let server = Server::bind("127.0.0.1:0", token).unwrap().with_foxglove("0").unwrap();
+        let server =
+            Server::bind("127.0.0.1:0", token, &crate::provenance::tests::provenance().made)
+                .unwrap()
+                .with_foxglove("0")
+                .unwrap();
         let address = server.address;
         let invitation = server.invitation(&"test");
         let foxglove = invitation.split_whitespace().find(|word| word.starts_with("ws://"));
@@ -475,7 +479,8 @@ fn images_that_are_given_up_are_counted_and_frames_are_not_waited_for() {
     *lock(&shared.overload) = overload::tests::given_up(3);
     let making = {
         let shared = Arc::clone(&shared);
-        let imaging = Imaging::new(&MethodSettings::default(), nirspi_nets::Device::cpu()).unwrap();
+        let imaging =
+            Imaging::new(&nirspi_nets::prior::settings(), nirspi_nets::Device::cpu()).unwrap();
         let imaging = imaging.with_method("slow", Box::new(Slow(TOOK)));
         let (publish, _) = watch::channel(Arc::new(Published::default()));
         std::thread::spawn(move || images(&shared, imaging, &publish))

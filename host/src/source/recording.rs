@@ -3,10 +3,10 @@
 use super::several::fits_together;
 use super::{NOT_CALIBRATED, Source, SourceError, SourceOptions, first_of, not_whole};
 use crate::account::{LossAccount, LossCounters};
-use crate::boards;
 use crate::calibration::KeptFlatField;
 use crate::causes;
 use crate::integrate::Integrated;
+use crate::provenance::Taken;
 use crate::recording::{End, Recording};
 use crate::tally::{self, Tally, tally_recording};
 use std::path::Path;
@@ -109,16 +109,20 @@ fn of_frames(
     let measurements = integrated
         .measurements_of(detector, setup, settling.as_ref(), options.keep_leak)
         .map_err(|problem| SourceError::Integrate { path: path.to_owned(), problem })?;
+    let read = super::of_frames(measurements)
+        .map_err(|problem| SourceError::Measurements { path: path.to_owned(), problem })?;
     let (dropouts, not_read, frames) = (Vec::new(), Vec::new(), Some(counters));
     let (imaginary, reference, flat_field) = (None, None, None);
     let source = Source {
-        measurements,
+        measurements: read.measurements,
         imaginary,
         dropouts,
+        outliers: read.outliers,
         not_read,
         reference,
         frames,
-        simulated: Some(boards::is_simulated(&recording.identity.board)),
+        taken: Taken::by(&recording.identity).from_file(path),
+        warnings: read.doubts.iter().map(ToString::to_string).collect(),
         notes,
         flat_field,
     };

@@ -67,6 +67,19 @@ pub struct CameraPicture {
     pub conditions: Conditions,
 }
 
+/// A measurement by the virtual camera, before an image is made of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraMeasurement {
+    /// The differences of pattern and complement, in ADC counts.
+    pub measurements: Measurements,
+    /// ADC counts of a pixel that sees a white target.
+    pub white_counts: f32,
+    /// Noise of a pixel of the plain transform of all patterns, of white: the readings' own noise.
+    pub noise: f32,
+    /// Defocus, as a standard deviation in pixels of the 64 x 64 grid.
+    pub sigma_px: f32,
+}
+
 /// Why the camera cannot be made, or gives no picture. `Display` is one line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -177,23 +190,9 @@ impl LinearCamera {
         conditions: Conditions,
         rng: &mut Pcg64Mcg,
     ) -> Result<CameraPicture, TrainingCameraError> {
-        let Conditions { distance_mm, sweeps, sampling, .. } = conditions;
-        let projector = self.camera.projector();
-        let field_mm = projector.field_mm(distance_mm);
-        let wide = Scene::new(mirrored(scene), 2 * SIDE_PX, 2.0 * field_mm)?;
-        let mut optics = VirtualOptics::of(&self.camera, wide, distance_mm)?;
-        optics = match conditions.rain {
-            Rainfall::None => optics,
-            Rainfall::Light => optics.in_weather(self.light.clone())?,
-            Rainfall::Heavy => optics.in_weather(self.heavy.clone())?,
-        };
-        let mut seen = exposed(&optics, sweeps, rng.random())?;
-        seen.iter_mut().zip(&self.gains).for_each(|(seen, gain)| *seen *= gain);
-        let shown = (f64::from(sampling) * LEDS as f64).round().clamp(1.0, LEDS as f64) as usize;
-        let rows = self.order.first(shown);
-        let mut differences = self.differences(&optics, &seen, &rows, sweeps, rng);
-        self.believed.correct_differential(&mut differences);
-        let measured = Measurements::from_differential(&rows, &differences)?;
+        let Taken { optics, field_mm, seen, measured } =
+            self.taken(scene, conditions, &self.order, rng)?;
+        let Conditions { sweeps, sampling, .. } = conditions;
         let image = reconstruct::hadamard(&measured);
 
         let white = white_counts(&optics);
@@ -209,6 +208,67 @@ impl LinearCamera {
             depth: depth(&optics, rng)?,
         };
         Ok(CameraPicture { reading, conditions })
+    }
+
+    /// Measures `scene`, as [`picture`](Self::picture) does, by the first patterns of `order`.
+    ///
+    /// # Errors
+    /// [`TrainingCameraError`] for conditions that are not physical.
+    pub fn measure(
+        &self,
+        scene: &[f32],
+        conditions: Conditions,
+        order: &Order,
+        rng: &mut Pcg64Mcg,
+    ) -> Result<CameraMeasurement, TrainingCameraError> {
+        let order = order.rows(Side::INSTRUMENT)?;
+        let Taken { optics, field_mm, seen, measured } =
+            self.taken(scene, conditions, &order, rng)?;
+        Ok(CameraMeasurement {
+            measurements: measured,
+            white_counts: white_counts(&optics) as f32,
+            noise: self.noise_std(&optics, &seen, conditions.sweeps) as f32,
+            sigma_px: (optics.blur_mm() / field_mm) as f32 * SIDE_PX as f32 / 4.0,
+        })
+    }
+
+    /// Number of sweeps for this noise of a pixel of all patterns, of white, at this distance in dry
+    /// air: at least 1.
+    ///
+    /// # Errors
+    /// [`TrainingCameraError`] for a distance that the optics refuse.
+    pub fn sweeps_for(&self, noise: f64, distance_mm: f64) -> Result<u32, TrainingCameraError> {
+        let grey = Scene::new(vec![0.5], 1, 1e4)?;
+        let optics = VirtualOptics::of(&self.camera, grey, distance_mm)?;
+        let one = self.noise_std(&optics, optics.footprint().weights(), 1);
+        Ok((one / noise).powi(2).round().max(1.0) as u32)
+    }
+
+    /// Light, receiver and calibrated readings of a scene.
+    fn taken(
+        &self,
+        scene: &[f32],
+        conditions: Conditions,
+        order: &Rows,
+        rng: &mut Pcg64Mcg,
+    ) -> Result<Taken, TrainingCameraError> {
+        let Conditions { distance_mm, sweeps, sampling, .. } = conditions;
+        let field_mm = self.camera.projector().field_mm(distance_mm);
+        let wide = Scene::new(mirrored(scene), 2 * SIDE_PX, 2.0 * field_mm)?;
+        let mut optics = VirtualOptics::of(&self.camera, wide, distance_mm)?;
+        optics = match conditions.rain {
+            Rainfall::None => optics,
+            Rainfall::Light => optics.in_weather(self.light.clone())?,
+            Rainfall::Heavy => optics.in_weather(self.heavy.clone())?,
+        };
+        let mut seen = exposed(&optics, sweeps, rng.random())?;
+        seen.iter_mut().zip(&self.gains).for_each(|(seen, gain)| *seen *= gain);
+        let shown = (f64::from(sampling) * LEDS as f64).round().clamp(1.0, LEDS as f64) as usize;
+        let rows = order.first(shown);
+        let mut differences = self.differences(&optics, &seen, &rows, sweeps, rng);
+        self.believed.correct_differential(&mut differences);
+        let measured = Measurements::from_differential(&rows, &differences)?;
+        Ok(Taken { optics, field_mm, seen, measured })
     }
 
     /// Pattern minus complement for each of `rows`, in mean ADC counts of one sample, with leak and
@@ -237,7 +297,7 @@ impl LinearCamera {
                 let taps = self.leaks.taps().iter().enumerate();
                 let light: f64 = taps.map(|(tap, share)| share * earlier(tap)).sum();
                 let normal: f64 = rng.sample(StandardNormal);
-                light + (mean_variance(optics, light, sweeps)).sqrt() * normal
+                light + optics.mean_variance(light, sweeps).sqrt() * normal
             })
             .collect();
         read.as_chunks::<2>().0.iter().map(|[pattern, complement]| pattern - complement).collect()
@@ -248,12 +308,21 @@ impl LinearCamera {
         let counts = white_counts(optics);
         // Each pattern lights half of the LEDs.
         let light = seen.iter().map(|&w| f64::from(w)).sum::<f64>() * counts / 2.0;
-        let difference = (2.0 * mean_variance(optics, light, sweeps)).sqrt();
+        let difference = (2.0 * optics.mean_variance(light, sweeps)).sqrt();
         let taps = self.believed.taps();
         // Correcting the leak divides by the share that a difference keeps in its own slot.
         let own = taps[0] - taps.get(1).unwrap_or(&0.0) / 2.0;
         difference / own / (LEDS as f64).sqrt() / counts
     }
+}
+
+/// What was measured, and by which optics.
+struct Taken {
+    optics: VirtualOptics,
+    field_mm: f64,
+    /// Mean reflectance that each LED illuminated.
+    seen: Vec<f32>,
+    measured: Measurements,
 }
 
 impl Degrade for LinearCamera {
@@ -276,17 +345,6 @@ fn white_counts(optics: &VirtualOptics) -> f64 {
 /// Clocks of a pattern, and number of clocks at its start whose samples are excluded.
 fn timing(camera: &CameraModel) -> (u16, u16) {
     (camera.readout.clocks_per_pattern, camera.readout.blanked)
-}
-
-/// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared: shot noise of
-/// the LEDs' light (in counts) and of daylight, amplifier, ADC, rounding.
-fn mean_variance(optics: &VirtualOptics, light_counts: f64, sweeps: u32) -> f64 {
-    let chain = optics.chain();
-    let gain = chain.electrons_per_count;
-    let electrons = (light_counts * gain).max(0.0) + chain.ambient_electrons;
-    let (clocks, blanked) = timing(optics.camera_model());
-    let window = u32::from(clocks.saturating_sub(blanked));
-    chain.variance_of_mean(electrons, window) / (gain * gain) / f64::from(sweeps)
 }
 
 /// Mean pattern of the LEDs' spots during an exposure.

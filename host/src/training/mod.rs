@@ -11,7 +11,7 @@ mod camera;
 pub mod fonts;
 pub mod pairs;
 
-pub use camera::{CameraPicture, Conditions, LinearCamera, TrainingCameraError};
+pub use camera::{CameraMeasurement, CameraPicture, Conditions, LinearCamera, TrainingCameraError};
 pub use nirspi_optics::rain::Rainfall;
 
 use nirspi_nets::degrade::{AnalyticCamera, Degrade, DegradeError, Reading};

@@ -7,7 +7,9 @@
 
 use super::{CameraPicture, LinearCamera, Rainfall, TrainingCameraError};
 use crate::files::FileError;
+use crate::files::measurement::PROVENANCE;
 use crate::files::{encode_archive, npy};
+use crate::provenance::Provenance;
 use nirspi_nets::data::{Origin, Part, Purpose, SIDE_PX, Scene, Scenes, stream};
 use nirspi_nets::degrade::READING_PX;
 use rayon::prelude::*;
@@ -51,6 +53,7 @@ pub fn take(
 ///
 /// | field | content |
 /// |---|---|
+/// | `provenance` | text: JSON |
 /// | `x` | `(N, 64, 64)` float32: the scene, sharp |
 /// | `optical` | `(N, 64, 64)` float32: the scene as light showed it, before sampling and noise |
 /// | `y` | `(N, 32, 32)` float32: the camera's image; 1 is a white target |
@@ -62,7 +65,12 @@ pub fn take(
 ///
 /// # Errors
 /// [`FileError`] naming `path`, if the archive cannot be written.
-pub fn encode(path: &Path, scenes: &Scenes, pairs: &[Pair]) -> Result<Vec<u8>, FileError> {
+pub fn encode(
+    path: &Path,
+    scenes: &Scenes,
+    pairs: &[Pair],
+    provenance: &Provenance,
+) -> Result<Vec<u8>, FileError> {
     let count = pairs.len();
     let images = |side: usize, of: &dyn Fn(&Pair) -> &[f32]| {
         let values: Vec<f32> = pairs.iter().flat_map(|pair| of(pair).iter().copied()).collect();
@@ -83,6 +91,7 @@ pub fn encode(path: &Path, scenes: &Scenes, pairs: &[Pair]) -> Result<Vec<u8>, F
         .flat_map(|pair| pair.picture.reading.depth.as_ref().map_or([0.0; 64], |d| d.metres))
         .collect();
     let members = [
+        (PROVENANCE, npy::encode_text(&provenance.json())),
         ("x", images(SIDE_PX, &|p| &p.scene.image)),
         ("optical", images(SIDE_PX, &|p| &p.picture.reading.optical)),
         ("y", images(READING_PX, &|p| &p.picture.reading.image)),
@@ -117,6 +126,7 @@ pub fn encode(path: &Path, scenes: &Scenes, pairs: &[Pair]) -> Result<Vec<u8>, F
 mod tests {
     use super::*;
     use crate::files::npy;
+    use crate::provenance::tests::provenance;
     use nirspi_optics::CameraModel;
 
     #[test]
@@ -128,7 +138,7 @@ mod tests {
         assert_eq!(two[..], four[..2]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("pairs.npz");
-        std::fs::write(&path, encode(&path, &scenes, &four).unwrap()).unwrap();
+        std::fs::write(&path, encode(&path, &scenes, &four, &provenance()).unwrap()).unwrap();
         let mut archive = zip::ZipArchive::new(std::fs::File::open(&path).unwrap()).unwrap();
         let mut y = archive.by_name("y.npy").unwrap();
         let alone = folder.path().join("y.npy");

@@ -30,10 +30,13 @@ pub use model::{CameraFileError, read_camera_model};
 pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
 #[cfg(feature = "enhance")]
-pub use panels::Panels;
+pub use panels::{Panels, SCENE_PX};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
-pub use shot::{Shot, ShotError, calibrate_against_white, flat_field_against_white, shoot};
+pub use shot::{
+    Shot, ShotError, calibrate_against_white, flat_field_against_white, shoot,
+    white_level_at_target,
+};
 #[cfg(feature = "enhance")]
 pub use stages::{Stages, StagesError, StagesReport, enhance_stages};
 pub use tunnel::serve_tunnel;

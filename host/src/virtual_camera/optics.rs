@@ -3,7 +3,7 @@
 use super::{OpticalFpga, VirtualCamera};
 use crate::scene::SceneMap;
 use crate::setup::MeasurementSetup;
-use nirspi_optics::camera::fnv1a;
+use nirspi_optics::camera::{canonical, fnv1a};
 use nirspi_optics::rain::{Air, BeamShadows, RainError, RainySpots, Weather};
 use nirspi_optics::{
     Budget, BudgetError, CameraModel, Chain, ChainError, ChainSettings, DepthError, DepthView,
@@ -138,10 +138,30 @@ impl VirtualOptics {
         Ok(Self { chain, ..sheet })
     }
 
-    /// ADC counts of one pixel for a white target, from the photon budget.
+    /// The same camera before a white sheet in place of the target: at its distance, in its weather.
+    ///
+    /// # Errors
+    /// Does not occur for optics that could be built, because distance and weather are the same.
+    pub fn white_sheet_at_target(&self) -> Result<Self, VirtualOpticsError> {
+        let sheet = Self::of(&self.camera, Scene::white(), self.distance_mm)?;
+        let ChainSettings { electrons_per_count, ambient_electrons, .. } = sheet.chain;
+        let chain = ChainSettings { electrons_per_count, ambient_electrons, ..self.chain };
+        let sheet = Self { chain, ..sheet };
+        match &self.weather {
+            Some(weather) => sheet.in_weather(weather.clone()),
+            None => Ok(sheet),
+        }
+    }
+
+    /// Variance of the mean of a slot's samples in `sweeps` sweeps, in counts squared, for this light
+    /// in counts: shot noise of the LEDs' light and of daylight, amplifier, ADC, rounding.
     #[must_use]
-    pub fn white_counts(&self) -> f64 {
-        self.budget.electrons_per_led / self.chain.electrons_per_count
+    pub fn mean_variance(&self, light_counts: f64, sweeps: u32) -> f64 {
+        let gain = self.chain.electrons_per_count;
+        let electrons = (light_counts * gain).max(0.0) + self.chain.ambient_electrons;
+        let readout = self.camera.readout;
+        let window = u32::from(readout.clocks_per_pattern.saturating_sub(readout.blanked));
+        self.chain.variance_of_mean(electrons, window) / (gain * gain) / f64::from(sweeps)
     }
 
     /// The serial number of the virtual camera with this seed. Cameras with different instruments
@@ -165,7 +185,7 @@ impl VirtualOptics {
             // settling.
             let chain =
                 ChainSettings { electrons_per_count: 1.0, ambient_electrons: 0.0, ..*chain };
-            format!("{camera:?} {chain:?}")
+            canonical(&camera) + &canonical(&chain)
         };
         let this = instrument(&self.camera, &self.chain);
         if this == instrument(CameraModel::paper(), &ChainSettings::default()) {
@@ -392,6 +412,14 @@ mod tests {
             assert!(serial.starts_with("virtual-3-") && !serials.contains(&serial), "{serial}");
             serials.push(serial);
         }
+    }
+
+    /// Kept calibrations on disk bear this serial number.
+    #[test]
+    fn the_serial_number_of_a_described_camera_is_frozen() {
+        let camera = CameraModel::parse("[adc]\nlatency_clocks = 9").unwrap();
+        let optics = VirtualOptics::of(&camera, Scene::white(), 300.0).unwrap();
+        assert_eq!(optics.serial(1), "virtual-1-884f6b2b");
     }
 
     #[test]

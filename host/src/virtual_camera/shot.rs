@@ -11,7 +11,7 @@ use crate::capture::{
 use crate::integrate::IntegrateError;
 use crate::session::{IgnorePackets, Session, SessionError};
 use crate::setup::MeasurementSetup;
-use nirspi_recon::{Measurements, Order, RowsError};
+use nirspi_recon::{Measurements, Order, RowsError, reconstruct};
 use nirspi_wire::Fault;
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -44,6 +44,17 @@ pub enum ShotError {
     /// The camera did not make all requested frames.
     #[error("the capture is not whole: {0}")]
     NotWhole(String),
+    /// Frames were lost between the camera and this program.
+    #[error("{0}; frames of more sweeps come slower and are not lost")]
+    Lost(String),
+    /// A white sheet gives no light.
+    #[error("a white sheet at {distance_m} m reads {counts:.3} ADC counts, expected more than 0")]
+    NoWhite {
+        /// The distance of the sheet.
+        distance_m: f64,
+        /// The mean of its pixels.
+        counts: f64,
+    },
     /// The flat field could not be measured against a white sheet.
     #[error("the virtual camera's flat field is not known")]
     FlatField(#[source] FlatFieldError),
@@ -98,12 +109,48 @@ pub fn flat_field_against_white(
     }
 }
 
+/// Frames for the white level, and sweeps of each: 20 ms of light with the paper's camera.
+const SHEET_FRAMES: u32 = 61;
+const SHEET_SWEEPS: u32 = 4;
+/// Makes the noise of the white sheet another one than that of the picture.
+const SHEET_SEED: u64 = 0x5EE7 << 48;
+
+/// The ADC counts of a pixel that sees a white sheet in place of the target, at the same distance
+/// and in the same weather, measured as a user would: the scale of the target's images.
+///
+/// # Errors
+/// [`ShotError`] if the sheet gives no light, or the capture fails.
+pub fn white_level_at_target(
+    optics: &VirtualOptics,
+    settling: &Settling,
+    flat_field: Option<&FlatField>,
+    seed: u64,
+) -> Result<f32, ShotError> {
+    let sheet = optics.white_sheet_at_target()?;
+    let setup = sheet.setup(&Order::Natural, 1.0)?;
+    let setup = MeasurementSetup { sweeps: SHEET_SWEEPS, ..setup };
+    let mut go_on = |_: &Progress| ControlFlow::Continue(());
+    let seed = seed ^ SHEET_SEED;
+    let shot = shoot(&sheet, setup, settling, SHEET_FRAMES, seed, &mut go_on)?;
+    let image = reconstruct::hadamard(&shot.measurements()?);
+    let image = match flat_field {
+        Some(flat) => flat.correct(&image),
+        None => image,
+    };
+    let sum: f64 = image.pixels().iter().map(|&counts| f64::from(counts)).sum();
+    let counts = sum / image.pixels().len() as f64;
+    if counts > 0.0 {
+        return Ok(counts as f32);
+    }
+    Err(ShotError::NoWhite { distance_m: optics.distance_mm() / 1e3, counts })
+}
+
 /// Captures `frames` frames with the camera with these optics. Its latency and settling are known.
 ///
 /// `watch` is called while frames arrive and may break to stop.
 ///
 /// # Errors
-/// [`ShotError`] unless all frames were made.
+/// [`ShotError`] unless all frames were made and received.
 pub fn shoot(
     optics: &VirtualOptics,
     setup: MeasurementSetup,
@@ -123,7 +170,10 @@ pub fn shoot(
     let capture = capture(&mut session, &options, watch)?;
     let missing = capture.missing();
     match capture.ended {
-        Ended::Complete => Ok(Shot { session, capture }),
+        Ended::Complete => match missing {
+            None => Ok(Shot { session, capture }),
+            Some(missing) => Err(ShotError::Lost(missing)),
+        },
         Ended::Stopped => Err(ShotError::Stopped { received: capture.counters.received }),
         Ended::Fault(fault) => Err(ShotError::Fault(fault)),
         Ended::LinkLost(error) | Ended::Unconfirmed(error) => Err(error.into()),

@@ -3,7 +3,7 @@
 use super::RunArgs;
 use crate::deblur::in_steps;
 use crate::networks::say_notes;
-use crate::print;
+use crate::{print, provenance};
 use anyhow::Result;
 use nirspi_eval::bench::enhance::{Stages, Timed, time};
 use nirspi_nets::deblur::Model;
@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = Options { consistency: !run.no_consistency, ..Options::default() };
     let timed = time(&stages, run.frames, &options, run.repeats, run.seed)?;
     say_notes(&networks);
-    print::json(&Report {
+    let report = Report {
         device: networks.device().name().to_owned(),
         weights: networks.used().to_vec(),
         threads: nirspi_eval::bench::threads(),
@@ -64,6 +64,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         precision: networks.device().arithmetic().to_string(),
         repeats: run.repeats,
         timed,
-    })?;
+    };
+    print::json(&report, &provenance::computed())?;
     Ok(ExitCode::SUCCESS)
 }

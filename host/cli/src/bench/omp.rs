@@ -1,7 +1,7 @@
 //! `nirspi bench omp`: times sparse representations of many frames.
 
 use crate::report::ReportArgs;
-use crate::{backend, print, refused};
+use crate::{backend, print, provenance, refused};
 use anyhow::{Context, Result};
 use clap::{ValueEnum, builder::RangedU64ValueParser};
 use nirspi::files::output::write_atomic;
@@ -102,6 +102,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             report.solutions.iter().map(|s| (&s.support[..], &s.coefficients[..])).collect();
         write_atomic(out, &problem::encode(out, problem.sparsity, &solutions)?)?;
     }
-    print::json(&report)?;
+    print::json(&report, &provenance::computed())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -2,7 +2,7 @@
 
 use super::RunArgs;
 use crate::networks::say_notes;
-use crate::{print, refused};
+use crate::{print, provenance, refused};
 use anyhow::Result;
 use nirspi_eval::bench::pipeline::{Settings, Timed, Work, on_cpu};
 use nirspi_nets::{Method, Networks, UsedWeights};
@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut networks = run.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let (timed, software) = time(&work, &mut networks)?;
     say_notes(&networks);
-    print::json(&Report {
+    let report = Report {
         device: networks.device().name().to_owned(),
         software,
         weights: networks.used().to_vec(),
@@ -72,7 +72,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         precision: networks.device().arithmetic().to_string(),
         repeats: run.repeats,
         timed,
-    })?;
+    };
+    print::json(&report, &provenance::computed())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -3,10 +3,11 @@
 
 use crate::print;
 use crate::progress::Progress;
-use crate::report::{ReportArgs, to_json};
+use crate::provenance;
+use crate::report::ReportArgs;
 use anyhow::Result;
-use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
+use nirspi::picture::signed_png;
 use nirspi_eval::quality::{Condition, Measured, Report, Settings, Study, Version};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -74,13 +75,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("quality", study.images(), "pictures");
     let Measured { report, pictures } = study.run(&|images| bar.add(images as u64))?;
     drop(bar);
+    let provenance = provenance::simulated();
     let mut out = OutputDir::create(&args.out)?;
     for (name, picture) in &pictures {
-        out.write(name, &encode_rgb(picture))?;
+        out.write(name, &signed_png(picture, &provenance))?;
     }
-    out.write("quality.json", to_json(&report)?.as_bytes())?;
+    out.write("quality.json", provenance.sign(&report)?.as_bytes())?;
     out.commit()?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
 fn say(args: &Args, report: &Report) -> Result<()> {

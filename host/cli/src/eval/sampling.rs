@@ -2,12 +2,13 @@
 
 use crate::camera::parse_order;
 use crate::progress::Progress;
-use crate::report::{ReportArgs, to_json};
+use crate::provenance::made;
+use crate::report::ReportArgs;
 use crate::source::SourceArgs;
 use crate::{print, refused};
 use anyhow::{Context, Result};
-use nirspi::files::image::encode_rgb;
 use nirspi::files::output::OutputDir;
+use nirspi::picture::signed_png;
 use nirspi_eval::sampling::{RECORDED, Study, default_orders};
 use nirspi_recon::Sampling;
 use std::path::PathBuf;
@@ -48,19 +49,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let shares = args.sampling.iter().map(|sampling| sampling.share()).collect();
     let study = Study::new(orders, shares).map_err(refused)?;
     let input = &args.source.input;
-    let measurements = args.source.load_real()?;
+    let (measurements, taken) = args.source.load_real()?;
+    let provenance = taken.made(made());
     let bar = Progress::of("sampling", study.images(), "images");
     let report = study
         .run(input.clone(), &measurements, &|| bar.add(1))
         .with_context(|| input.display().to_string())?;
     drop(bar);
-    let tables = study.tables(&report);
+    let tables = format!("{}\n{provenance}\n", study.tables(&report));
     let mut out = OutputDir::create(&args.out)?;
     out.write("sampling.md", tables.as_bytes())?;
-    out.write("sampling.json", to_json(&report)?.as_bytes())?;
-    out.write("sampling.png", &encode_rgb(&study.plot(&report)))?;
+    out.write("sampling.json", provenance.sign(&report)?.as_bytes())?;
+    out.write("sampling.png", &signed_png(&study.plot(&report), &provenance))?;
     out.commit()?;
-    args.report.print(&report, |_| {
+    args.report.print(&report, &provenance, |_| {
         print::line(tables.trim_end())?;
         let folder = args.out.display();
         print::line(format_args!("wrote sampling.md, sampling.json and sampling.png to {folder}"))

@@ -4,7 +4,6 @@ use super::OutputArgs;
 use crate::progress::Progress;
 use crate::{print, refused};
 use anyhow::Result;
-use nirspi::files::image::encode_rgb;
 use nirspi_eval::table1::{Report, Settings, chart, table1};
 use nirspi_recon::Sampling;
 use nirspi_recon::words::{count, count_of};
@@ -39,7 +38,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("table 1", args.repeats, "pictures");
     let report = table1(&settings, &|| bar.add(1)).map_err(refused)?;
     drop(bar);
-    let picture = || Ok(encode_rgb(&chart(&report).render()));
+    let picture = || Ok(chart(&report).render());
     args.output.hand_over("table1", &report, picture, say)
 }
 

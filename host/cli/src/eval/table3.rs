@@ -5,7 +5,6 @@ use super::{AncestralArgs, ExposureArgs, OutputArgs};
 use crate::print;
 use crate::progress::Progress;
 use anyhow::Result;
-use nirspi::files::image::encode_rgb;
 use nirspi_eval::table3::{Report, Row, Settings, Table};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,7 +46,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let table = Table::take(settings, &|| bar.add(1))?;
     drop(bar);
     let report = table.report()?;
-    let picture = || Ok(encode_rgb(&table.picture()?));
+    let picture = || Ok(table.picture()?);
     args.output.hand_over("table3", &report, picture, say)
 }
 

@@ -5,7 +5,6 @@ use super::{AncestralArgs, ExposureArgs, OutputArgs};
 use crate::print;
 use crate::progress::Progress;
 use anyhow::Result;
-use nirspi::files::image::encode_rgb;
 use nirspi_eval::estimate::Estimate;
 use nirspi_eval::table4::{Report, Settings, chart, table4};
 use std::process::ExitCode;
@@ -43,7 +42,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("table 4", settings.pictures(), "pictures");
     let report = table4(&settings, &|| bar.add(1))?;
     drop(bar);
-    let picture = || Ok(encode_rgb(&chart(&report).render()));
+    let picture = || Ok(chart(&report).render());
     args.output.hand_over("table4", &report, picture, say)
 }
 

@@ -3,9 +3,11 @@
 use super::{Args, print};
 use crate::Usage;
 use crate::progress::Progress;
+use crate::provenance::made;
 use crate::report::ReportArgs;
 use anyhow::Result;
 use nirspi::archive::{ArchiveOptions, ArchiveReport, ImageFiles, RowReader, Shard, Work, archive};
+use nirspi::provenance::{Provenance, Taken};
 use nirspi::source::FirstPatterns;
 use nirspi_nets::Device;
 use std::num::NonZeroUsize;
@@ -57,6 +59,7 @@ impl FolderArgs {
         options: &ArchiveOptions,
         items: &str,
         printed: ReportArgs,
+        provenance: &Provenance,
     ) -> Result<(ArchiveReport, ExitCode)> {
         let mut bar = None;
         let report = archive(work, options, &AtomicBool::new(false), &mut |done| {
@@ -64,7 +67,7 @@ impl FolderArgs {
             bar.set(done.done);
         })?;
         drop(bar);
-        let code = printed.print(&report, |report| {
+        let code = printed.print(&report, provenance, |report| {
             let reasons = report.skipped.iter().map(|skipped| &skipped.reason);
             reasons.map(|reason| format!("skipped: {reason}")).try_for_each(print::note)?;
             print::line(report)
@@ -88,5 +91,6 @@ pub fn run(args: &Args, first: FirstPatterns) -> Result<ExitCode> {
         reader = reader.enhanced(Device::cpu());
     }
     let work = ImageFiles::of(input, reader)?;
-    Ok(args.folder.run(&work, &options, "files", args.report)?.1)
+    let provenance = Taken::of_file(input, None).made(made());
+    Ok(args.folder.run(&work, &options, "files", args.report, &provenance)?.1)
 }

@@ -2,13 +2,15 @@
 
 use super::{Args, print, spinning};
 use crate::Usage;
+use crate::provenance::made;
 use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::measurement::{Plain, Selection, read_plain};
 use nirspi::files::npy;
 use nirspi::picture::{Pictures, Unit};
+use nirspi::provenance::Taken;
 use nirspi::reconstruct::{check_finite, not_read_words, read_atoms, write_image};
-use nirspi_recon::reconstruct::{MatrixSettings, Method, OwnMatrix, Setting};
+use nirspi_recon::reconstruct::{DarkLevel, MatrixSettings, Method, OwnMatrix, Setting};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Sampling, Side};
 use serde::Serialize;
@@ -34,6 +36,9 @@ struct Report {
     sparsity: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     stop: Option<&'static str>,
+    /// The reading without light that was fitted with the image; none with --no-dark.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dark_level: Option<f64>,
     relative_residual: f64,
     not_read: Vec<usize>,
     notes: Vec<String>,
@@ -83,10 +88,12 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
     if own.unseen_pixels() > 0 {
         notes.push(format!("no pattern sees {}", count_of(own.unseen_pixels(), "pixel")));
     }
+    notes.extend(found.dark.note().map(str::to_owned));
     let basis = match &args.method.dictionary {
         Some(path) => path.display().to_string(),
         None => settings.basis.to_string(),
     };
+    let provenance = Taken::of_file(&args.source.input, None).made(made());
     let report = Report {
         input: args.source.input.clone(),
         matrix: path.to_owned(),
@@ -100,14 +107,15 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         strength: found.strength,
         sparsity: found.atoms.map(|(size, _)| size),
         stop: found.atoms.map(|(_, stop)| args.method.atoms().reason(stop)),
+        dark_level: (found.dark != DarkLevel::LeftOut).then_some(found.dark.value()),
         relative_residual: found.residual,
         not_read,
         notes,
-        pictures: Pictures::of_image(&found.image, Unit::Readings, None),
+        pictures: Pictures::of_image(&found.image, Unit::Readings, None, &provenance),
         stage_ms: times,
     };
     write_image(&args.out, &found.image, None, None, &report.pictures, &report)?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
 fn settings(args: &Args) -> Result<MatrixSettings> {
@@ -124,6 +132,7 @@ fn settings(args: &Args) -> Result<MatrixSettings> {
         strength: args.method.strength,
         sparsity: args.method.sparsity,
         non_negative: args.method.non_negative,
+        dark: !args.no_dark,
         ..MatrixSettings::new(method)
     })
 }
@@ -142,8 +151,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     let strength = report.strength.map(|t| format!(", strength {t}")).unwrap_or_default();
     let atoms = report.sparsity.map(|k| format!(", {}", count_of(k, "atom"))).unwrap_or_default();
     let basis = report.basis.as_ref().map(|b| format!(", {b} basis")).unwrap_or_default();
+    let dark =
+        report.dark_level.map(|level| format!(", dark level {level:.4}")).unwrap_or_default();
     print::line(format_args!(
-        "{}{basis}{atoms}{strength}, relative residual {:.3}",
+        "{}{basis}{atoms}{strength}{dark}, relative residual {:.3}",
         args.method.method.name(),
         report.relative_residual
     ))?;

@@ -4,14 +4,15 @@
 use super::{Args, print, spinning};
 use crate::Usage;
 use crate::method::Solved;
-use crate::report::{StageTimes, stages, to_json};
+use crate::provenance::made;
+use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
 use nirspi::picture::{Pictures, Unit};
 use nirspi::reconstruct::{check_finite, not_read_words};
-use nirspi::source::{FirstPatterns, Index};
+use nirspi::source::{FirstPatterns, Index, OutlierReport};
 use nirspi_recon::reconstruct::{Method, Reconstruction, Setting};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Measurements, Rows};
@@ -39,6 +40,8 @@ struct FrameReport {
     method: MethodReport,
     #[serde(skip_serializing_if = "Option::is_none")]
     enhancement: Option<Enhanced>,
+    outliers: Vec<OutlierReport>,
+    warnings: Vec<String>,
     notes: Vec<String>,
 }
 
@@ -76,6 +79,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let mut others = others.into_iter();
     let (mut images, mut frames) = (Vec::new(), Vec::new());
     let unit = Unit::of_readings(sources[0].frames.is_some());
+    let provenance = sources[0].taken.made(made());
     for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
         let warm = made.report.warm;
         let Solved { mut image, report } = args.method.solved(made);
@@ -91,9 +95,19 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         if !source.not_read.is_empty() {
             notes.push(not_read_words(&source.not_read));
         }
+        let outliers: Vec<_> = source.outliers.iter().map(OutlierReport::of).collect();
+        let warnings = source.warnings;
         notes.extend(source.notes);
         let used = used.rows().len();
-        frames.push(FrameReport { used, warm, method: report, enhancement: None, notes });
+        frames.push(FrameReport {
+            used,
+            warm,
+            method: report,
+            enhancement: None,
+            outliers,
+            warnings,
+            notes,
+        });
         images.push(image);
     }
     let mut sharp = None;
@@ -111,7 +125,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let short = |at: &usize| frames[*at].enhancement.as_ref().is_some_and(|e| !e.short.is_empty());
     let warned = (0..frames.len()).filter(short).collect();
     let sharp_and_warned = sharp.as_deref().map(|sharp| (sharp, warned));
-    let pictures = Pictures::of_video(&named(), &images, unit, sharp_and_warned);
+    let pictures = Pictures::of_video(&named(), &images, unit, sharp_and_warned, &provenance);
     let report = Report {
         input: args.source.input.clone(),
         n,
@@ -129,9 +143,9 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
         out.write("enhanced.npy", &npy::encode(&[images.len(), side, side], &sharp))?;
     }
     report.pictures.write(&mut out)?;
-    out.write("report.json", to_json(&report)?.as_bytes())?;
+    out.write("report.json", provenance.sign(&report)?.as_bytes())?;
     out.commit()?;
-    args.report.print(&report, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, report))
 }
 
 /// The image of each frame.
@@ -165,7 +179,10 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     }
     for (at, frame) in report.frames.iter().enumerate() {
         let warnings = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
-        for warning in warnings {
+        for outlier in &frame.outliers {
+            print::line(format_args!("{what} {at}: {outlier}"))?;
+        }
+        for warning in warnings.chain(&frame.warnings) {
             print::line(format_args!("warning: {what} {at}: {warning}"))?;
         }
         for note in &frame.notes {

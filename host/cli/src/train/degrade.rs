@@ -4,6 +4,7 @@ use super::data::DataArgs;
 use crate::camera::ModelArgs;
 use crate::print;
 use crate::progress::Progress;
+use crate::provenance;
 use crate::report::ReportArgs;
 use anyhow::Result;
 use nirspi::files::output::write_atomic;
@@ -63,7 +64,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let count = args.count as usize;
     let pairs = pairs::take(&scenes, part, &camera, count, args.seed, &|| bar.add(1))?;
     drop(bar);
-    write_atomic(&args.out, &pairs::encode(&args.out, &scenes, &pairs)?)?;
+    let provenance = provenance::simulated();
+    write_atomic(&args.out, &pairs::encode(&args.out, &scenes, &pairs, &provenance)?)?;
     let report = Report {
         simulated: true,
         pairs: pairs.len(),
@@ -72,7 +74,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         data,
         out: args.out.clone(),
     };
-    args.report.print(&report, |report| {
+    args.report.print(&report, &provenance, |report| {
         let Found { held_out_images, training_images, .. } = report.data;
         let images = if report.held_out { held_out_images } else { training_images };
         print::line(format_args!(

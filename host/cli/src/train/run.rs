@@ -2,7 +2,7 @@
 
 use super::network::Args;
 use crate::progress::Progress;
-use crate::{print, refused, stop_on_signal};
+use crate::{print, provenance, refused, stop_on_signal};
 use anyhow::Result;
 use nirspi_eval::train::{Report, Request, Watch, run as train};
 use nirspi_nets::train::{Ended, Entry, Model, Settings};
@@ -21,12 +21,13 @@ pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
         out: args.out.clone(),
         resume: args.resume,
         backend: args.backend,
+        made: provenance::made().clone(),
     };
     let stop = stop_on_signal()?;
     let mut shown = Shown { bar: None, stop };
     let report = train(&request, &mut shown).map_err(refused)?;
     drop(shown);
-    args.report.print(&report, say)
+    args.report.print(&report, &provenance::simulated(), say)
 }
 
 impl Args {

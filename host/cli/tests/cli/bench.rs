@@ -1,5 +1,6 @@
 //! A place to run the program in: folders, processes, measurement files.
 
+use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use std::fs::{self, File};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -237,6 +238,12 @@ impl Outcome {
     pub fn json(&self) -> serde_json::Value {
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {self:?}"))
     }
+}
+
+/// A provenance for pictures that tests write.
+pub fn provenance() -> Provenance {
+    let made = Made::by("another 1.0", None, ["another"], 0);
+    Taken::without_camera(Origin::Unknown).made(&made)
 }
 
 /// The bytes of a `.npz` file of float32 arrays: name, shape, values.

@@ -53,3 +53,21 @@ fn a_folder_takes_more_pictures_than_a_process_may_have_files_open() {
     bench.run_limited("ulimit -n 64", &upscale).succeeded();
     assert_eq!(std::fs::read_dir(bench.path("pictures")).unwrap().count(), COUNT);
 }
+
+#[test]
+fn a_capture_takes_the_light_that_was_asked_for_at_every_share() {
+    let bench = Bench::new();
+    for (name, share) in [("all.mcap", "100%"), ("few.mcap", "2%")] {
+        let capture = ["capture", "--light", "20ms", "--sampling", share, "--out", name, "--json"];
+        let report = bench.run(&capture).succeeded().json();
+        assert_eq!(report["frames"]["lost"], 0, "{share}: {report}");
+        // Of 1024 patterns and complements of 40 ns, or of 20.
+        let sweep_ms = if share == "2%" { 20.0 } else { 1024.0 } * 80e-6;
+        let info = bench.run(&["reconstruct", name, "--json", "--method", "hadamard"]).succeeded();
+        assert_eq!(info.json()["frames"]["received"], report["frames"]["received"]);
+        let recording = nirspi::recording::Recording::open(&bench.path(name)).unwrap();
+        let light_ms =
+            sweep_ms * f64::from(recording.setup.sweeps) * report["made"].as_f64().unwrap();
+        assert!((light_ms / 20.0 - 1.0).abs() < 0.005, "{share}: {light_ms} ms");
+    }
+}

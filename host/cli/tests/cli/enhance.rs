@@ -1,9 +1,8 @@
 //! `nirspi upscale`, `deblur` and `enhance`. That the networks compute what they should is tested in `nirspi-nets`.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// A blurred bar on `side` x `side` pixels, brightness from 0 to 1.
@@ -31,6 +30,12 @@ fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
             "spread.npy",
             "--interval",
             "interval.npy",
+            "--method",
+            "tikhonov",
+            "--sampling",
+            "1",
+            "--readings-noise",
+            "0.01",
             "--out",
             "out.npy",
             "--backend",
@@ -47,16 +52,26 @@ fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
     let widths = npy::read_stack(&bench.path("interval.npy")).unwrap();
     assert_eq!((widths.count, widths.height), (2, 64));
     assert!(widths.values.iter().all(|width| *width > 0.0 && *width < 1.0));
-    // A width is one of the calibration's table, and the bar's edges are less sure than the dark beside it.
-    let kinds: BTreeSet<u32> = widths.values[..4096].iter().map(|width| width.to_bits()).collect();
-    assert!((2..100).contains(&kinds.len()), "{}", kinds.len());
+    // The bar's edges are less sure than the dark beside it, and no width is finer than a bench.
+    assert!(widths.values.iter().all(|width| *width >= nirspi_nets::interval::FLOOR));
     assert_eq!(widths.values[..4096], widths.values[4096..], "the same image, the same widths");
     let most =
         |columns: Range<usize>| columns.map(|x| widths.values[32 * 64 + x]).fold(0.0_f32, f32::max);
     assert!(most(20..30) > most(0..8), "{} {}", most(20..30), most(0..8));
-    let several = ["enhance", "in.npy", "--steps", "2", "--interval", "i.npy", "--out", "o.npy"];
-    bench.run(&several).failed(1, &["no intervals", "not for diffusion in 2 steps"]);
-    assert!(!bench.path("i.npy").exists());
+    let enhance = ["enhance", "in.npy", "--interval", "i.npy", "--out", "o.npy"];
+    let readings =
+        |method, share, noise| ["--method", method, "--sampling", share, "--readings-noise", noise];
+    let refused = |more: &[&str], code, told: &[&str]| {
+        bench.run(&[&enhance[..], more].concat()).failed(code, told);
+        assert!(!bench.path("i.npy").exists() && !bench.path("o.npy").exists());
+    };
+    let good = readings("omp", "0.5", "0.03");
+    let steps = [&good[..], &["--steps", "2"]].concat();
+    refused(&steps, 1, &["no intervals", "not for diffusion in 2 steps"]);
+    // Nothing is known of the readings, or more is asked for than the calibration holds.
+    refused(&[], 2, &["--method", "--sampling", "--readings-noise"]);
+    refused(&readings("omp", "0.02", "0.03"), 1, &["no intervals", "10 to 100 % of the patterns"]);
+    refused(&readings("omp", "0.5", "0.7"), 1, &["no intervals", "up to 20 % of white"]);
     assert_eq!((&report["images"], &report["model"]), (&2.into(), &"diffusion".into()));
     for key in ["sigma_px", "noise", "inconsistency"] {
         assert!(report[key][1].as_f64().is_some_and(|v| (0.0..10.0).contains(&v)), "{report}");
@@ -80,7 +95,7 @@ fn a_single_image_stays_one_and_bytes_are_grey_levels() {
     file[descr..descr + 3].copy_from_slice(b"|u1");
     file.extend(&levels);
     bench.write("bytes.npy", &file);
-    bench.write("in.png", &encode_grey(32, 32, &bar(32)));
+    bench.write("in.png", &encode_grey(32, 32, &bar(32), &provenance()));
     bench.run(&["upscale", "bytes.npy", "--out", "from_bytes.npy"]).succeeded();
     bench.run(&["upscale", "in.png", "--out", "from_png.npy"]).succeeded();
     assert_eq!(bench.pixels("from_bytes.npy"), bench.pixels("from_png.npy"));
@@ -94,7 +109,7 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
     let bench = Bench::new();
     std::fs::create_dir(bench.path("in")).unwrap();
     for name in ["b.png", "a.png"] {
-        bench.write(&format!("in/{name}"), &encode_grey(64, 64, &bar(64)));
+        bench.write(&format!("in/{name}"), &encode_grey(64, 64, &bar(64), &provenance()));
     }
     bench.write("in/notes.txt", b"not a picture");
     bench.run(&["deblur", "in", "--steps", "2", "--out", "sharp"]).succeeded();
@@ -107,7 +122,7 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
     // `*.picture.png` is written beside the folder, for people to look at. In a folder of images it is not read.
     std::fs::copy(bench.path("sharp.picture.png"), bench.path("in/sharp.picture.png")).unwrap();
     bench.run(&["deblur", "in", "--out", "sharper"]).succeeded();
-    bench.write("in/c.png", &encode_grey(32, 32, &bar(32)));
+    bench.write("in/c.png", &encode_grey(32, 32, &bar(32), &provenance()));
     bench
         .run(&["deblur", "in", "--out", "again"])
         .failed(1, &["c.png", "32 x 32", "64 x 64", "a.png"]);
@@ -123,7 +138,7 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
         npy::encode(&[2, 32, 32], &stack)
     };
     bench.write("nan.npy", &with(1024 + 32 + 3, f32::NAN));
-    bench.write("bright.npy", &with(1024 + 32 + 3, 1.25));
+    bench.write("bright.npy", &with(1024 + 32 + 3, 1.75));
     bench.write("dark.npy", &with(5, -0.5));
     bench.write("good.npy", &with(0, 0.5));
     bench.write("large.npy", &npy::encode(&[1, 64, 64], &bar(64)));
@@ -135,7 +150,7 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
     let files = bench.names();
     let enhance = |input: &str| bench.run(&["enhance", input, "--out", "out.npy"]);
     enhance("nan.npy").failed(1, &["nan.npy", "NaN", "[1, 1, 3]"]);
-    enhance("bright.npy").failed(1, &["bright.npy", "image 1, row 1, column 3 is 1.25", "0 to 1"]);
+    enhance("bright.npy").failed(1, &["bright.npy", "image 1, row 1, column 3 is 1.75", "0 to 1"]);
     enhance("dark.npy").failed(1, &["dark.npy", "-0.5", "0 to 1"]);
     enhance("large.npy").failed(1, &["large.npy", "64 x 64", "expected 32 x 32"]);
     enhance("empty.npy").failed(1, &["empty.npy", "(0, 32, 32)"]);
@@ -284,4 +299,25 @@ fn a_precision_that_does_not_exist_is_refused_and_the_processor_has_one_alone() 
     let said = "precision f16 needs a GPU with tensor cores, through CUDA; CPU computes in f32";
     assert!(half.code == Some(0) && half.stderr.contains(said), "{half:?}");
     enhance("bf16").failed(2, &["precision \"bf16\", expected f32 or f16"]);
+}
+
+#[test]
+fn noise_below_black_and_above_white_is_cut_and_counted() {
+    let bench = Bench::new();
+    let of = |low: f32, high: f32| -> Vec<f32> {
+        let value = |at: usize| match at {
+            7 => low,
+            99 | 500 => high,
+            at => (at % 32) as f32 / 31.0,
+        };
+        (0..1024).map(value).collect()
+    };
+    let encode = |values: &[f32]| nirspi::files::npy::encode(&[1, 32, 32], values);
+    bench.write("noisy.npy", &encode(&of(-0.3, 1.4)));
+    bench.write("cut.npy", &encode(&of(0.0, 1.0)));
+    let said = bench.run(&["enhance", "noisy.npy", "--out", "a.npy"]).succeeded().stdout;
+    assert!(said.contains("noisy.npy: 3 values below 0 or above 1"), "{said}");
+    let said = bench.run(&["enhance", "cut.npy", "--out", "b.npy"]).succeeded().stdout;
+    assert!(!said.contains("below 0"), "{said}");
+    assert_eq!(bench.pixels("a.npy"), bench.pixels("b.npy"));
 }

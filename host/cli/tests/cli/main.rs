@@ -15,6 +15,7 @@ mod capture_files;
 mod capture_tcp;
 mod demo;
 mod dishonest_cameras;
+mod doors;
 mod enhance;
 mod everyday;
 mod foreign_devices;
@@ -23,8 +24,10 @@ mod other_forms;
 mod packaging;
 #[cfg(unix)]
 mod preview;
+mod provenance;
 mod quality;
 mod rain;
+mod readings;
 mod readme;
 mod real_data;
 mod reconstruct;

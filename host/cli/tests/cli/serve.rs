@@ -262,7 +262,7 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
     let set = server.change(r#"{"method": "hadamard", "enhance": false, "frames": 3}"#).json();
     let expected = serde_json::json!({
         "method": "hadamard", "strength": null, "warm_start": false, "enhance": false, "model": "diffusion", "frames": 3,
-        "order": "cake-cutting", "sampling": 0.5, "sweeps": 1, "record": false
+        "order": "cake-cutting", "sampling": 0.5, "sweeps": 2, "record": false
     });
     assert_eq!(set, expected);
     server.state("switched", |state| {

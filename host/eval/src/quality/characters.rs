@@ -2,17 +2,18 @@
 //!
 //! # Invariant
 //! Every image belongs to a family, writer or photograph outside the training data
-//! (`tests::only_groups_held_out_are_taken`).
+//! (`tests::only_groups_held_out_are_taken`), and none is byte for byte an image of the training
+//! data under another family's name (`tests::no_held_out_image_is_one_of_training`).
 
 use crate::error::{EvalError, On, Result};
 use nirspi::files::characters;
 use nirspi_nets::HELD_OUT;
-use nirspi_nets::data::Stack;
+use nirspi_nets::data::{Families, Stack};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The least number of images of a stack, because a distance of sets needs two.
@@ -76,7 +77,8 @@ impl Characters {
     }
 
     /// `count` images of each stack, chosen by the seed from these groups of the stack. A stack
-    /// that is not named is taken whole.
+    /// that is not named is taken whole. Groups that share an image with a group that is not in the
+    /// lists are left out with a note.
     #[must_use]
     pub fn of(
         stacks: &[Stack],
@@ -84,17 +86,46 @@ impl Characters {
         count: usize,
         seed: u64,
     ) -> Self {
+        Self::of_each(stacks, groups, &|_| count, seed)
+    }
+
+    /// As [`of`](Self::of), with a number of images that depends on the stack's name.
+    #[must_use]
+    pub fn of_each(
+        stacks: &[Stack],
+        groups: &BTreeMap<String, Vec<u32>>,
+        count: &dyn Fn(&str) -> usize,
+        seed: u64,
+    ) -> Self {
         let mut all = Self { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
-        for stack in stacks {
-            all.add(stack, groups.get(stack.name()).map(Vec::as_slice), count, seed);
+        let named: Vec<Option<&[u32]>> =
+            stacks.iter().map(|stack| groups.get(stack.name()).map(Vec::as_slice)).collect();
+        let unseen = Families::of(stacks).unseen(&named);
+        for ((stack, named), unseen) in stacks.iter().zip(named).zip(unseen) {
+            all.add(stack, named, &unseen, count(stack.name()), seed);
         }
         all
     }
 
-    fn add(&mut self, stack: &Stack, groups: Option<&[u32]>, count: usize, seed: u64) {
-        let unseen = |at: &usize| groups.is_none_or(|g| g.contains(&stack.groups()[*at]));
+    fn add(
+        &mut self,
+        stack: &Stack,
+        named: Option<&[u32]>,
+        unseen: &BTreeSet<u32>,
+        count: usize,
+        seed: u64,
+    ) {
+        let groups: BTreeSet<u32> = stack.groups().iter().copied().collect();
+        let wanted = |group: &u32| named.is_none_or(|named| named.contains(group));
+        let shared = groups.iter().filter(|g| wanted(g) && !unseen.contains(g)).count();
+        if shared > 0 {
+            let name = stack.name();
+            self.notes
+                .push(format!("{name}: {shared} groups share images with training: left out"));
+        }
+        let unseen = |at: &usize| unseen.contains(&stack.groups()[*at]);
         let mut places: Vec<usize> = (0..stack.len()).filter(unseen).collect();
-        let choice = match groups {
+        let choice = match named {
             Some(_) => format!("of {} held out", places.len()),
             None => format!("of {}: training is not said to have seen this stack", places.len()),
         };
@@ -123,7 +154,7 @@ impl Characters {
     /// Number of groups among the images of a stack.
     fn groups_of(&self, stack: usize) -> usize {
         let groups = self.all.iter().filter(|c| c.stack == stack).map(|c| c.group);
-        groups.collect::<std::collections::BTreeSet<u32>>().len()
+        groups.collect::<BTreeSet<u32>>().len()
     }
 
     /// The first `count` images of each stack.
@@ -188,17 +219,62 @@ mod tests {
     use super::*;
     use nirspi_nets::data::Kind;
 
-    /// Six images of two writers each. The level of each image is its number.
-    fn stack() -> Stack {
-        let pixels = (0..6 * 64 * 64).map(|at| (at / 4096) as u8).collect();
+    /// Six images of two writers each. The level of each image is its number, but for its first
+    /// pixel, which is `marks`' level.
+    fn stack_with(marks: [u8; 6]) -> Stack {
+        let mut pixels: Vec<u8> = (0..6 * 64 * 64).map(|at| (at / 4096) as u8).collect();
+        for (at, mark) in marks.into_iter().enumerate() {
+            pixels[4096 * at..4096 * (at + 1)].fill(mark);
+            pixels[4096 * at] = 200;
+        }
         Stack::new("own", Kind::Drawn, pixels, Some((0..6).collect()), vec![1, 1, 2, 2, 3, 3])
             .unwrap()
     }
 
+    fn of_stack(stack: Stack, groups: Option<&[u32]>, count: usize, seed: u64) -> Characters {
+        let named = groups.map(|groups| ("own".to_owned(), groups.to_vec()));
+        Characters::of(&[stack], &named.into_iter().collect(), count, seed)
+    }
+
     fn of(groups: Option<&[u32]>, count: usize, seed: u64) -> Characters {
-        let mut all = Characters { all: Vec::new(), origins: Vec::new(), notes: Vec::new() };
-        all.add(&stack(), groups, count, seed);
-        all
+        of_stack(stack_with([0, 1, 2, 3, 4, 5]), groups, count, seed)
+    }
+
+    #[test]
+    fn a_group_that_shares_an_image_with_training_is_left_out_with_a_note() {
+        // The first image of writer 3, who is held out, is the second of writer 2, who is not.
+        let taken = of_stack(stack_with([0, 1, 2, 3, 3, 5]), Some(&[1, 3]), 2, 1);
+        assert!(taken.iter().all(|image| image.group == 1) && taken.len() == 2, "{taken:?}");
+        assert_eq!(taken.notes(), ["own: 1 groups share images with training: left out"]);
+    }
+
+    #[test]
+    fn no_held_out_image_is_one_of_training() {
+        let Some(data) = std::env::var_os("NIRSPI_DATA") else {
+            eprintln!("skipped: NIRSPI_DATA is not set, so there are no characters");
+            return;
+        };
+        let stacks = characters::read(&Path::new(&data).join("chars74k")).unwrap();
+        let held_out = groups(HELD_OUT).unwrap();
+        let (mut training, mut judged) = (BTreeSet::new(), Vec::new());
+        for stack in &stacks {
+            for (at, group) in stack.groups().iter().enumerate() {
+                match held_out[stack.name()].contains(group) {
+                    true => judged.push((stack.name(), *group, stack.image(at))),
+                    false => _ = training.insert(stack.image(at)),
+                }
+            }
+        }
+        let twins: Vec<(&str, u32)> = judged
+            .iter()
+            .filter(|(.., image)| training.contains(image))
+            .map(|&(name, group, _)| (name, group))
+            .collect();
+        assert_eq!(twins, [], "images of held-out groups that are byte for byte in training");
+        // The list leaves nothing to leave out: it is the one truth about the split.
+        let taken = Characters::of(&stacks, &held_out, usize::MAX, 1);
+        assert_eq!(taken.len(), judged.len());
+        assert!(!taken.notes().iter().any(|note| note.contains("share")), "{:?}", taken.notes());
     }
 
     #[test]

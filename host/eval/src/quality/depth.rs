@@ -258,6 +258,7 @@ fn panel(title: &str, values: Vec<f32>, scene: &Scene) -> Panel {
         unit: Unit::OfWhite,
         caption: vec![format!("{psnr:.2} dB")],
         warnings: Vec::new(),
+        field_mm: None,
     }
 }
 

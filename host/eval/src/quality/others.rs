@@ -186,6 +186,7 @@ pub fn enhance(scenes: &[Scene], contender: &Contender) -> Result<Shown> {
             unit: Unit::OfWhite,
             caption: Vec::new(),
             warnings: Vec::new(),
+            field_mm: None,
         };
         for (place, scene) in some.iter().enumerate() {
             let before = upscale_2x(&scene.readings, 1, SIDE / 2, SIDE / 2)?;

@@ -165,6 +165,7 @@ mod tests {
     use super::*;
     use nirspi::files::image::encode_grey;
     use nirspi::files::npy::encode;
+    use nirspi::provenance::{Made, Origin, Taken};
 
     fn stack(values: &[f32]) -> Stack {
         Stack { count: values.len() / 4, height: 2, width: 2, values: values.to_vec() }
@@ -214,8 +215,10 @@ mod tests {
         let values = [0.0_f32, 0.2, 0.4, 1.0];
         write("out/image.npy", &encode(&[2, 2], &values));
         write("demo/reconstruction.npy", &encode(&[2, 2], &values));
-        write("pictures/b.png", &encode_grey(2, 2, &values));
-        write("pictures/a.png", &encode_grey(2, 2, &values));
+        let made = Made::by("test", None, ["test"], 0);
+        let provenance = Taken::without_camera(Origin::Computed).made(&made);
+        write("pictures/b.png", &encode_grey(2, 2, &values, &provenance));
+        write("pictures/a.png", &encode_grey(2, 2, &values, &provenance));
         for (name, count) in [("out", 1), ("demo", 1), ("pictures", 2), ("pictures/a.png", 1)] {
             let found = read_images(&folder.path().join(name)).unwrap();
             assert_eq!((found.count, found.height, found.width), (count, 2, 2), "{name}");

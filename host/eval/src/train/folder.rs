@@ -7,9 +7,9 @@
 
 use super::data::Found;
 use crate::error::{EvalError, On, Result};
-use nirspi::files::image::encode_rgb;
 use nirspi::files::output::{OutputDir, write_atomic};
-use nirspi::picture::{Axis, Chart, Line, below};
+use nirspi::picture::{Axis, Chart, Line, below, signed_png};
+use nirspi::provenance::Provenance;
 use nirspi_nets::train::Entry;
 use nirspi_nets::train::checkpoint::Checkpoint;
 use std::fs::{File, OpenOptions};
@@ -112,11 +112,11 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`EvalError`] for a file that cannot be written.
-    pub fn checkpoint(&self, bytes: &[u8], log: &[Entry]) -> Result<()> {
+    pub fn checkpoint(&self, bytes: &[u8], log: &[Entry], provenance: &Provenance) -> Result<()> {
         write_atomic(&self.file(Self::CHECKPOINT), bytes)?;
         let charts: Vec<_> = plot(log).iter().map(Chart::render).collect();
         if !charts.is_empty() {
-            write_atomic(&self.file(Self::PLOT), &encode_rgb(&below(&charts)))?;
+            write_atomic(&self.file(Self::PLOT), &signed_png(&below(&charts), provenance))?;
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 use super::data::{Data, Found};
 use super::folder::RunFolder;
 use crate::error::{EvalError, On, Result};
+use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi::training::{LinearCamera, Mixed};
 use nirspi_nets::Weights;
 use nirspi_nets::degrade::{AnalyticCamera, Limits};
@@ -34,6 +35,8 @@ pub struct Request {
     pub resume: bool,
     /// The backend.
     pub backend: Backend,
+    /// The program, for the provenance of the plot.
+    pub made: Made,
 }
 
 /// Observes a run.
@@ -129,7 +132,8 @@ pub fn run(request: &Request, watch: &mut dyn Watch) -> Result<Report> {
     };
     folder.write_data(&data)?;
     watch.starts(settings, resumed.as_ref().map_or(0, |checkpoint| checkpoint.progress.step));
-    let mut keeper = Kept { folder: &mut folder, watch, held_out: None };
+    let provenance = Taken::without_camera(Origin::Computed).made(&request.made);
+    let mut keeper = Kept { folder: &mut folder, watch, held_out: None, provenance };
     let trained_on = request.trained_on(&data);
     let outcome = train(settings, &examples, &trained_on, resumed, &device, &mut keeper);
     Ok(Report {
@@ -189,6 +193,7 @@ struct Kept<'k> {
     folder: &'k mut RunFolder,
     watch: &'k mut dyn Watch,
     held_out: Option<f64>,
+    provenance: Provenance,
 }
 
 type Boxed = Box<dyn std::error::Error + Send + Sync>;
@@ -202,7 +207,7 @@ impl Keeper for Kept<'_> {
 
     fn checkpoint(&mut self, checkpoint: &Checkpoint) -> Result<(), Boxed> {
         let bytes = checkpoint.to_bytes()?;
-        Ok(self.folder.checkpoint(&bytes, &checkpoint.progress.log)?)
+        Ok(self.folder.checkpoint(&bytes, &checkpoint.progress.log, &self.provenance)?)
     }
 
     fn best(&mut self, weights: &Weights) -> Result<(), Boxed> {
@@ -250,7 +255,8 @@ mod tests {
         let data = Data { stacks: Vec::new(), fonts: Vec::new(), held_out: 0.1, shapes: 0.15 };
         let (camera_share, fsrcnn, resume, backend) = (0.0, None, false, Backend::Cpu);
         let camera = CameraModel::default();
-        Request { settings, data, camera, camera_share, fsrcnn, out, resume, backend }
+        let made = Made::by("test", None, ["test"], 0);
+        Request { settings, data, camera, camera_share, fsrcnn, out, resume, backend, made }
     }
 
     #[test]

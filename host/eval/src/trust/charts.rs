@@ -1,56 +1,42 @@
 //! The coverage curve, and a picture of images with their intervals, the worst among them.
 
-use super::{AREA, CONDITIONS, Covered, TARGETS};
-use crate::error::{EvalError, Result};
-use crate::quality::{Characters, Condition};
+use super::learn::At;
+use super::shots::{Shot, Studio};
+use super::{AREA, Covered, NATURAL};
+use crate::error::Result;
 use image::RgbImage;
 use nirspi::picture::{Axis, Chart, Line, Panel, Range, SideBySide, Unit};
 use nirspi_nets::interval::{Intervals, share_of_prior};
-use nirspi_nets::reading::Reader;
-use nirspi_nets::{Enhanced, Images};
 
-/// The condition of the picture: the strongest blur of the targets.
-pub(super) const SHOWN: usize = TARGETS - 1;
-
-/// The nominal coverage against that seen, one line a stack: the mean of the targets' conditions.
+/// The nominal coverage against that seen on natural scenes, one line a method.
 pub(super) fn curve(coverage: &[Covered]) -> RgbImage {
-    let targets = &CONDITIONS[..TARGETS];
-    let mut stacks: Vec<&str> = coverage.iter().map(|covered| covered.stack.as_str()).collect();
-    stacks.dedup();
-    stacks.sort_unstable();
-    stacks.dedup();
     let percent = |share: f64| 100.0 * share;
-    let line = |(colour, stack): (usize, &&str)| {
-        let taken =
-            coverage.iter().filter(|c| c.stack == **stack && targets.contains(&c.condition));
-        let rows: Vec<&Covered> = taken.collect();
-        let levels = rows.first().map_or([0.0; 7], |row| row.levels);
-        let seen = |k: usize| rows.iter().map(|row| row.seen[k]).sum::<f64>() / rows.len() as f64;
-        let points = levels.iter().enumerate();
-        Line {
-            name: (*stack).to_owned(),
-            colour,
-            dashed: false,
-            points: points.map(|(k, &level)| (percent(level), percent(seen(k)))).collect(),
-        }
+    let rows: Vec<&Covered> =
+        coverage.iter().filter(|row| row.images_of == NATURAL && row.condition == "all").collect();
+    let line = |(colour, row): (usize, &&Covered)| Line {
+        name: row.method.clone(),
+        colour,
+        dashed: false,
+        points: row
+            .levels
+            .iter()
+            .zip(row.seen)
+            .map(|(&l, seen)| (percent(l), percent(seen)))
+            .collect(),
     };
-    let mut lines: Vec<Line> = stacks.iter().enumerate().map(line).collect();
+    let mut lines: Vec<Line> = rows.iter().enumerate().map(line).collect();
     let colour = lines.len();
     let points = vec![(50.0, 50.0), (100.0, 100.0)];
     lines.push(Line { name: "as it should be".to_owned(), colour, dashed: true, points });
     let ticks = vec![40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 95.0, 100.0];
-    let images: usize = stacks
-        .iter()
-        .filter_map(|s| coverage.iter().find(|c| c.stack == *s))
-        .map(|c| c.images)
-        .sum();
+    let images: usize = rows.iter().map(|row| row.images).sum();
     let chart = Chart {
-        header: "Coverage of the intervals, blur 1 to 3 px, noise 3 %".to_owned(),
+        header: "Coverage of the intervals on natural scenes, by method".to_owned(),
         x: Axis::of("nominal, per cent of the pixels", ticks[1..].to_vec(), false),
         y: Axis::of("seen, per cent of the pixels", ticks, false),
         lines,
         footer: format!(
-            "simulated: {images} images that neither training nor calibration has seen, three blurs each"
+            "simulated: {images} images that neither training nor calibration has seen"
         ),
     };
     chart.render()
@@ -63,48 +49,47 @@ pub(super) struct Shown {
     caption: Vec<String>,
 }
 
-/// Of each stack the image whose coverage is the median, and the image with the worst.
+/// Of each method the shot whose coverage is the median, and the shot with the worst.
 pub(super) fn cases(
     intervals: &Intervals,
-    reader: &Reader,
-    images: &Characters,
-    made: &Enhanced,
+    studio: &Studio,
+    shots: &[(At, Shot)],
 ) -> Result<Vec<Shown>> {
-    let seen = made.seen().ok_or_else(|| EvalError::Content("no images of 64 x 64".to_owned()))?;
-    let readings = reader.read(Images::new(&made.images)?);
-    let mut all: Vec<(usize, f64, Shown)> = images
-        .iter()
-        .zip(seen)
-        .zip(readings)
-        .map(|((image, seen), reading)| {
-            let widths = intervals.half_widths(&seen);
-            let errors: Vec<f32> =
-                seen.image.iter().zip(&image.sharp).map(|(a, b)| (a - b).abs()).collect();
-            let within = errors.iter().zip(&widths).filter(|(e, w)| e <= w).count();
-            let within = within as f64 / AREA as f64;
-            let caption = vec![
-                format!("{:.1} % of the pixels within", 100.0 * within),
-                format!("{:.1} % the prior's", 100.0 * share_of_prior(&widths)),
-                reading.to_string(),
-            ];
-            let values = [seen.image.to_vec(), image.sharp.clone(), widths, errors];
-            (image.stack, within, Shown { title: String::new(), values, caption })
-        })
-        .collect();
-    all.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut chosen = Vec::new();
-    for (at, origin) in images.origins().iter().enumerate() {
-        let (of_stack, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|case| case.0 == at);
-        all = rest;
-        let middle = of_stack.len() / 2;
-        for (place, (.., mut case)) in of_stack.into_iter().enumerate() {
+    for (number, method) in studio.methods.iter().enumerate() {
+        let mut all = Vec::new();
+        for (_, shot) in shots.iter().filter(|(_, shot)| shot.method == number) {
+            let Some(seen) = shot.seen() else { continue };
+            let widths = intervals.half_widths(&seen, &shot.readings(studio))?;
+            let errors: Vec<f32> =
+                seen.image.iter().zip(&shot.truth).map(|(a, b)| (a - b).abs()).collect();
+            let within = errors.iter().zip(&widths).filter(|(e, w)| e <= w).count();
+            all.push((within, shot, widths, errors));
+        }
+        all.sort_by_key(|(within, ..)| *within);
+        let middle = all.len() / 2;
+        for (place, (within, shot, widths, errors)) in all.into_iter().enumerate() {
             let which = match place {
                 0 => "worst",
                 place if place == middle => "median",
                 _ => continue,
             };
-            case.title = format!("{}: {which}", origin.stack);
-            chosen.push(case);
+            let condition = shot.condition;
+            let caption = vec![
+                format!("{:.1} % of the pixels within", 100.0 * within as f64 / AREA as f64),
+                format!("{:.1} % the prior's", 100.0 * share_of_prior(&widths)),
+                format!(
+                    "{:.0} % of the patterns, noise {:.1} %",
+                    100.0 * condition.share,
+                    100.0 * condition.noise
+                ),
+            ];
+            let values = [shot.made.images.clone(), shot.truth.clone(), widths, errors];
+            chosen.push(Shown {
+                title: format!("{}: {which}", method.argument()),
+                values,
+                caption,
+            });
         }
     }
     Ok(chosen)
@@ -114,7 +99,7 @@ pub(super) fn cases(
 const BRIGHTER: f32 = 2.0;
 
 /// The picture: each case is a square of enhanced image and truth above half-width and error.
-pub(super) fn picture(cases: Vec<Shown>, condition: Condition) -> RgbImage {
+pub(super) fn picture(cases: Vec<Shown>) -> RgbImage {
     let panels = cases.into_iter().map(|case| {
         let [image, truth, widths, errors] = &case.values;
         let row = |values: &[f32], row: usize| values[64 * row..64 * (row + 1)].to_vec();
@@ -130,13 +115,9 @@ pub(super) fn picture(cases: Vec<Shown>, condition: Condition) -> RgbImage {
     });
     let panels: Vec<Panel> = panels.collect();
     let all = SideBySide {
-        header: format!(
-            "Enhanced image and truth, half-width of the 95 % interval and error: blur {} px, noise {} %",
-            condition.sigma_px,
-            100.0 * condition.noise
-        ),
+        header: "Enhanced image and truth, half-width of the 95 % interval and error".to_owned(),
         panels,
-        footer: "simulated; of each stack the image with the worst coverage and that with the median; above: enhanced, \
+        footer: "simulated; of each method the image with the worst coverage and that with the median; above: enhanced, \
                  truth; below: half-width, error, both twice as bright"
             .to_owned(),
     };

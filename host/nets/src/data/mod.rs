@@ -10,6 +10,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`stack`] | images of 64 x 64 with label and group (font family, writer, photograph) |
+//! | [`families`] | groups that share an image, which no split takes apart |
 //! | [`split`] | the groups that training never uses |
 //! | [`augment`] | changed views of an image: moved, bent, on another ground |
 //! | [`shapes`] | procedural scenes without letters |
@@ -17,12 +18,14 @@
 
 pub mod augment;
 mod canvas;
+pub mod families;
 pub mod scenes;
 pub mod shapes;
 pub mod split;
 pub mod stack;
 mod stream;
 
+pub use families::Families;
 pub use scenes::{Origin, Part, Scene, Scenes};
 pub use split::Split;
 pub use stack::{DataError, Kind, Stack};

@@ -3,12 +3,14 @@
 //! # Invariant
 //! Each group is whole on one of the two sides
 //! (`tests::no_group_is_on_both_sides_and_no_image_is_lost`). Otherwise the bold style of a font
-//! family, or a writer's second sheet, would be known from training when it is judged.
+//! family, or a writer's second sheet, would be known from training when it is judged. Groups that
+//! share an image are on the same side, so no held-out image is byte for byte one of training
+//! (`tests::groups_that_share_an_image_are_on_the_same_side`).
 
-use super::{DataError, Purpose, Stack, stream};
+use super::{DataError, Families, Purpose, Stack, stream};
 use rand::seq::SliceRandom;
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// An image, given by its stack and its number there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -41,13 +43,14 @@ pub struct HeldOutGroups {
 }
 
 impl Split {
-    /// Holds out `share` of the groups of each stack, at least one, chosen by the seed. The choice
-    /// depends on the seed, the stack's name and its groups, and not on other stacks or the order
-    /// of images.
+    /// Holds out `share` of the [families](Families) of each stack, at least one, chosen by the seed.
+    /// The choice depends on the seed, the stack's name, its groups and its images, and not on the
+    /// order of images, or on other stacks unless they share images with the stack: a family is held
+    /// out in all stacks if it is held out in one.
     ///
     /// # Errors
-    /// [`DataError`] if a stack has only one group, there is no stack, or `share` is not above 0
-    /// and below 1.
+    /// [`DataError`] if a stack has only one family, all families of a stack are held out through
+    /// other stacks, there is no stack, or `share` is not above 0 and below 1.
     pub fn new(stacks: &[Stack], share: f64, seed: u64) -> Result<Self, DataError> {
         if !(share > 0.0 && share < 1.0) {
             let expected = "more than 0 and less than 1";
@@ -60,28 +63,44 @@ impl Split {
         if stacks.is_empty() {
             return Err(DataError::Empty);
         }
-        let mut split = Self { training: Vec::new(), held_out: Vec::new(), groups: Vec::new() };
+        let families = Families::of(stacks);
+        let mut held_families: BTreeSet<usize> = BTreeSet::new();
         for (at, stack) in stacks.iter().enumerate() {
-            let all: BTreeSet<u32> = stack.groups().iter().copied().collect();
-            if all.len() < 2 {
+            // A family is named by its smallest group, so that other stacks change nothing.
+            let mut first: BTreeMap<usize, u32> = BTreeMap::new();
+            for (&group, &family) in families.of_stack(at) {
+                first.entry(family).or_insert(group);
+            }
+            if first.len() < 2 {
                 return Err(DataError::OneGroup { name: stack.name().to_owned() });
             }
-            let wanted = ((all.len() as f64 * share).round() as usize).clamp(1, all.len() - 1);
-            let mut shuffled: Vec<u32> = all.iter().copied().collect();
+            let wanted = ((first.len() as f64 * share).round() as usize).clamp(1, first.len() - 1);
+            let mut shuffled: Vec<(u32, usize)> =
+                first.into_iter().map(|(family, group)| (group, family)).collect();
+            shuffled.sort_unstable();
             shuffled.shuffle(&mut stream(seed, Purpose::Split, name_hash(stack.name())));
-            let held_out: BTreeSet<u32> = shuffled[..wanted].iter().copied().collect();
+            held_families.extend(shuffled[..wanted].iter().map(|&(_, family)| family));
+        }
+        let mut split = Self { training: Vec::new(), held_out: Vec::new(), groups: Vec::new() };
+        for (at, stack) in stacks.iter().enumerate() {
+            let of = families.of_stack(at);
+            let hidden = |family: &usize| held_families.contains(family);
+            if of.values().all(hidden) {
+                return Err(DataError::OneGroup { name: stack.name().to_owned() });
+            }
             for (image, group) in stack.groups().iter().enumerate() {
-                let side = match held_out.contains(group) {
+                let side = match hidden(&of[group]) {
                     true => &mut split.held_out,
                     false => &mut split.training,
                 };
                 side.push(Place { stack: at, image });
             }
+            let held_out = of.iter().filter(|(_, family)| hidden(family)).map(|(&group, _)| group);
             split.groups.push(HeldOutGroups {
                 stack: stack.name().to_owned(),
                 images: stack.len(),
-                groups: all.len(),
-                held_out: held_out.into_iter().collect(),
+                groups: of.len(),
+                held_out: held_out.collect(),
             });
         }
         Ok(split)
@@ -119,9 +138,42 @@ mod tests {
     use crate::data::{AREA_PX, Kind};
     use proptest::prelude::*;
 
+    /// A stack whose images are all alike and blank, so that groups share no glyph.
     fn stack(name: &str, groups: &[u32]) -> Stack {
         let levels = vec![0; groups.len() * AREA_PX];
         Stack::new(name, Kind::Drawn, levels, None, groups.to_vec()).unwrap()
+    }
+
+    /// A stack of one image a group, group k with glyph `glyphs[k]`.
+    fn of_glyphs(name: &str, glyphs: &[u8]) -> Stack {
+        let image = |&glyph: &u8| {
+            let mut image = vec![0; AREA_PX];
+            image[usize::from(glyph)] = 255;
+            image
+        };
+        let levels = glyphs.iter().flat_map(image).collect();
+        Stack::new(name, Kind::Drawn, levels, None, (0..glyphs.len() as u32).collect()).unwrap()
+    }
+
+    #[test]
+    fn groups_that_share_an_image_are_on_the_same_side() {
+        // Each glyph is in two groups of a stack, and glyph 3 in both stacks.
+        let stacks = [
+            of_glyphs("a", &[1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 5, 6]),
+            of_glyphs("b", &[3, 20, 21, 22, 20, 21, 22]),
+        ];
+        for seed in 0..40 {
+            let split = Split::new(&stacks, 0.3, seed).unwrap();
+            let of = |places: &[Place]| -> BTreeSet<Vec<u8>> {
+                places.iter().map(|p| stacks[p.stack].image(p.image).to_vec()).collect()
+            };
+            let (training, held_out) = (of(split.training()), of(split.held_out()));
+            assert!(training.is_disjoint(&held_out), "seed {seed}");
+            assert_eq!(split.training().len() + split.held_out().len(), 19);
+        }
+        let twice = [of_glyphs("a", &[1, 2]), of_glyphs("b", &[1, 1])];
+        let refused = Split::new(&twice, 0.5, 1).unwrap_err();
+        assert_eq!(refused, DataError::OneGroup { name: "b".to_owned() });
     }
 
     proptest! {

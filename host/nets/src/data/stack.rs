@@ -53,9 +53,10 @@ pub enum DataError {
         /// The label.
         found: u8,
     },
-    /// One group cannot be split.
+    /// One family of groups cannot be split.
     #[error(
-        "{name}: all images are of one group, expected two or more, so that one can be held out"
+        "{name}: all images are of one group, or of groups that share images; expected two or more, \
+         so that one can be held out"
     )]
     OneGroup {
         /// The stack.

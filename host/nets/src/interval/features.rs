@@ -1,15 +1,16 @@
 //! What is known about a pixel of an enhanced image without its truth.
 
-use super::Seen;
+use super::{Readings, Seen};
 use crate::deblur::{AREA, SIDE};
 
 /// Number of features of a pixel.
-pub(super) const FEATURES: usize = 12;
+pub(super) const FEATURES: usize = 14;
 /// Number of terms of the polynomial of second degree in the features.
 pub(super) const TERMS: usize = 1 + FEATURES + FEATURES * (FEATURES + 1) / 2;
-/// The feature that says how busy an image is: it tells a letter on black from a photograph, and
-/// a photograph of a letter from a natural scene.
+/// How busy an image is: how much neighbouring pixels differ.
 pub(super) const BUSYNESS: usize = 8;
+/// The contrast of an image.
+pub(super) const CONTRAST: usize = 10;
 
 /// The names of the features, for the record.
 pub(super) const NAMES: [&str; FEATURES] = [
@@ -17,7 +18,7 @@ pub(super) const NAMES: [&str; FEATURES] = [
     "range of 7 x 7 pixels",
     "change by deblurring, mean of 3 x 3 pixels",
     "distance from black or white",
-    "estimated noise",
+    "noise of the readings",
     "estimated blur",
     "greyness of the image",
     "inconsistency",
@@ -25,10 +26,12 @@ pub(super) const NAMES: [&str; FEATURES] = [
     "mean over the image of the third feature",
     "contrast of the image",
     "mean range of 3 x 3 pixels before deblurring",
+    "share of the patterns",
+    "estimated noise",
 ];
 
 /// The features of each pixel of an image.
-pub(super) fn features(seen: &Seen<'_>) -> Vec<[f32; FEATURES]> {
+pub(super) fn features(seen: &Seen<'_>, readings: &Readings<'_>) -> Vec<[f32; FEATURES]> {
     let Seen { image, fused, estimate, inconsistency } = *seen;
     let range = |image, radius| {
         let (most, least) = (window(image, radius, f32::max), window(image, radius, f32::min));
@@ -42,7 +45,7 @@ pub(super) fn features(seen: &Seen<'_>) -> Vec<[f32; FEATURES]> {
     let changed: Vec<f32> = image.iter().zip(fused).map(|(a, b)| (a - b).abs() / 9.0).collect();
     let changed = logs(&window(&changed, 1, |a, b| a + b), 0.005);
     let of_image = [
-        (estimate.noise.max(0.0) + 0.004).ln(),
+        (readings.noise.max(0.0) + 0.004).ln(),
         estimate.sigma_px.clamp(0.0, 5.0),
         (mean(image.iter().map(|v| 4.0 * v * (1.0 - v))) + 0.02).ln(),
         inconsistency.clamp(0.3, 3.0).ln(),
@@ -50,6 +53,8 @@ pub(super) fn features(seen: &Seen<'_>) -> Vec<[f32; FEATURES]> {
         mean(changed.iter().copied()),
         (deviation(image) + 0.01).ln(),
         (mean(range(fused, 1).into_iter()) + 0.002).ln(),
+        readings.share.max(0.01).ln(),
+        (estimate.noise.max(0.0) + 0.004).ln(),
     ];
     (0..AREA)
         .map(|at| {
@@ -129,7 +134,8 @@ mod tests {
     #[test]
     fn the_terms_are_one_and_every_product_once() {
         // Primes: every product is another number.
-        let features = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
+        let features =
+            [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0, 41.0, 43.0];
         let mut found = terms(&features).to_vec();
         found.sort_by(f32::total_cmp);
         found.dedup();

@@ -31,18 +31,30 @@ impl Drawn {
         Self { image, fused, truth, estimate }
     }
 
+    /// Readings of low noise, of all patterns or of half of them in turn.
+    fn readings(&self) -> Readings<'static> {
+        let share = if self.estimate.sigma_px > 1.04 { 0.5 } else { 1.0 };
+        Readings { method: "tikhonov", share, noise: 0.02 }
+    }
+
     fn seen(&self) -> Seen<'_> {
         let Self { image, fused, estimate, .. } = self;
         Seen { image, fused, estimate: *estimate, inconsistency: 1.0 }
     }
 
     fn sample(&self) -> Sample<'_> {
-        Sample { seen: self.seen(), truth: &self.truth, weight: 1.0 }
+        Sample {
+            seen: self.seen(),
+            readings: self.readings(),
+            truth: &self.truth,
+            weight: 1.0,
+            kind: 0,
+        }
     }
 
     /// Number of pixels whose truth is within the half-width.
     fn within(&self, table: &Table, level: usize) -> usize {
-        let widths = table.half_widths(&self.seen(), level);
+        let widths = table.half_widths(&self.seen(), &self.readings(), level);
         let errors = self.image.iter().zip(&self.truth).map(|(a, b)| (a - b).abs());
         errors.zip(widths).filter(|(error, width)| error <= width).count()
     }
@@ -54,7 +66,7 @@ fn drawn(numbers: std::ops::Range<usize>) -> Vec<Drawn> {
 
 fn learnt(images: &[Drawn]) -> Table {
     let samples: Vec<Sample<'_>> = images.iter().map(Drawn::sample).collect();
-    Table::learn(&samples, 8, 2, 2).unwrap()
+    Table::learn(&samples, 8, 2).unwrap()
 }
 
 /// The share of all pixels of these images within the half-width of a level.
@@ -64,16 +76,16 @@ fn coverage(table: &Table, images: &[Drawn], level: usize) -> f64 {
 }
 
 #[test]
-fn the_share_of_each_level_lies_within_also_in_images_that_were_not_learnt() {
+fn the_share_of_the_level_lies_within_also_in_images_that_were_not_learnt() {
     let (learn, others) = (drawn(0..40), drawn(100..140));
     let table = learnt(&learn);
-    for (level, &nominal) in LEVELS.iter().enumerate() {
-        for (images, apart) in [(&learn, 0.002), (&others, 0.02)] {
-            let found = coverage(&table, images, level);
-            assert!((found - nominal).abs() < apart, "{nominal}: {found}");
-        }
+    for (images, apart) in [(&learn, 0.01), (&others, 0.025)] {
+        let found = coverage(&table, images, LEVEL);
+        assert!(found > LEVELS[LEVEL] - apart && found < LEVELS[LEVEL] + 0.03, "{found}");
     }
-    let widths = table.half_widths(&others[0].seen(), LEVEL);
+    let shares: Vec<f64> = (0..LEVELS.len()).map(|l| coverage(&table, &others, l)).collect();
+    assert!(shares.is_sorted() && shares[0] < 0.8, "{shares:?}");
+    let widths = table.half_widths(&others[0].seen(), &others[0].readings(), LEVEL);
     let edge = others[0].truth.iter().position(|&v| v == 0.8).unwrap();
     assert!(widths[edge] > 3.0 * widths[0], "{} at the edge, {} far away", widths[edge], widths[0]);
 }
@@ -82,45 +94,62 @@ fn the_share_of_each_level_lies_within_also_in_images_that_were_not_learnt() {
 fn a_higher_level_is_never_narrower() {
     let images = drawn(0..20);
     let table = learnt(&images);
-    let all: Vec<Vec<f32>> =
-        (0..LEVELS.len()).map(|level| table.half_widths(&images[3].seen(), level)).collect();
+    let of = |level| table.half_widths(&images[3].seen(), &images[3].readings(), level);
+    let all: Vec<Vec<f32>> = (0..LEVELS.len()).map(of).collect();
     assert!(all.windows(2).all(|pair| pair[0].iter().zip(&pair[1]).all(|(a, b)| a <= b)));
 }
 
 #[test]
-fn a_bin_of_few_pixels_has_the_half_widths_of_all_blurs() {
-    let mut images = drawn(0..40);
-    for (k, image) in images.iter_mut().enumerate() {
-        image.estimate.sigma_px = 1.0 + 0.05 * k as f32;
+fn no_half_width_is_below_what_a_bench_can_hold() {
+    // The calibration images are perfect, and a bench is not.
+    let mut images = drawn(0..20);
+    for image in &mut images {
+        image.image.clone_from(&image.truth);
     }
-    let samples: Vec<Sample<'_>> = images.iter().map(Drawn::sample).collect();
-    let together = Table::learn(&samples, 8, 2, 1).unwrap();
-    // A bin for the blur of each image: at the bar's edges it has less than half an image's pixels.
-    let apart = Table::learn(&samples, 8, 2, 40).unwrap();
+    let table = learnt(&images);
     for image in &images {
-        let edge = image.truth.iter().position(|&v| v == 0.8).unwrap();
-        let [together, apart] = [&together, &apart].map(|t| t.half_widths(&image.seen(), LEVEL));
-        assert_eq!(together[edge], apart[edge]);
+        let widths = table.half_widths(&image.seen(), &image.readings(), LEVEL);
+        assert!(widths.iter().all(|width| *width >= FLOOR));
     }
+    let intervals = Intervals::shipped().unwrap();
+    let readings = Readings { method: "tikhonov", share: 1.0, noise: 0.0 };
+    let black = vec![0.0; AREA];
+    let estimate = Estimate { sigma_px: 0.3, noise: 0.0 };
+    let seen = Seen { image: &black, fused: &black, estimate, inconsistency: 0.3 };
+    let widths = intervals.half_widths(&seen, &readings).unwrap();
+    assert!(widths.iter().all(|width| *width >= FLOOR), "{}", widths[0]);
+}
+
+#[test]
+fn edges_are_the_largest_steps_and_a_flat_image_has_none() {
+    let bar = Drawn::new(0).truth;
+    let found = edges(&bar);
+    let columns: std::collections::BTreeSet<usize> =
+        (0..AREA).filter(|&at| found[at]).map(|at| at % 64).collect();
+    assert_eq!(columns.into_iter().collect::<Vec<_>>(), [28, 35]);
+    assert!(!edges(&vec![0.4; AREA]).contains(&true));
 }
 
 #[test]
 fn too_few_images_give_no_table() {
     let images = drawn(0..19);
     let samples: Vec<Sample<'_>> = images.iter().map(Drawn::sample).collect();
-    let error = Table::learn(&samples, 8, 2, 2).unwrap_err();
+    let error = Table::learn(&samples, 8, 2).unwrap_err();
     assert_eq!(error.to_string(), "19 images for calibration, expected at least 20");
 }
 
 #[test]
 fn a_table_with_a_list_of_another_length_is_refused() {
     let shipped: serde_json::Value = serde_json::from_str(nirspi_weights::INTERVALS).unwrap();
-    for list in ["scale_bounds", "blur_bounds", "polynomial", "levels", "half_widths"] {
+    for list in ["scale_bounds", "texture_bounds", "polynomial", "levels", "factors", "cells"] {
         let mut other = shipped.clone();
-        other["pixels"][list].as_array_mut().unwrap().pop();
+        other["methods"]["omp"][list].as_array_mut().unwrap().pop();
         let error = Intervals::parse(&other.to_string()).unwrap_err();
         assert!(matches!(error, NoIntervals::Table(TableError::Form)), "{list}: {error}");
     }
+    let mut other = shipped;
+    other["characters"]["presence"]["output"].as_array_mut().unwrap().pop();
+    assert!(Intervals::parse(&other.to_string()).is_err());
     let error = Intervals::parse("{}").unwrap_err().to_string();
     assert!(error.starts_with("the calibration of the intervals cannot be read: "), "{error}");
 }
@@ -151,13 +180,43 @@ fn other_weights_get_no_interval_and_one_line_says_so() {
 }
 
 #[test]
+fn other_readings_get_no_interval_and_one_line_says_why() {
+    let intervals = Intervals::shipped().unwrap();
+    let known = Readings { method: "prior", share: 0.5, noise: 0.03 };
+    intervals.table(&known).unwrap();
+    for (readings, expected) in [
+        (Readings { method: "mine", ..known }, "not by mine"),
+        (Readings { share: 0.05, ..known }, "10 to 100 % of the patterns, not for 5.0 %"),
+        (Readings { share: f32::NAN, ..known }, "of the patterns, not for NaN %"),
+        (Readings { noise: 0.3, ..known }, "up to 20 % of white, not for 30.0 %"),
+        (Readings { noise: f32::NAN, ..known }, "of white, not for NaN %"),
+    ] {
+        let error = intervals.table(&readings).unwrap_err().to_string();
+        assert!(error.starts_with("no intervals: they are calibrated for"), "{error}");
+        assert!(error.ends_with(expected) && error.lines().count() == 1, "{error}");
+    }
+    for method in ["hadamard", "omp", "tikhonov", "fista", "tv", "prior"] {
+        intervals.table(&Readings { method, ..known }).unwrap();
+    }
+}
+
+#[test]
+fn the_shipped_intervals_belong_to_the_shipped_networks_that_of_the_reconstruction_among_them() {
+    let intervals = Intervals::shipped().unwrap();
+    for network in NETWORKS.into_iter().chain(["prior", "classifier"]) {
+        intervals.expect(network, &Weights::embedded(network).unwrap()).unwrap();
+    }
+}
+
+#[test]
 fn the_shipped_intervals_are_wide_at_the_edges_of_a_blurred_bar() {
     let reading: Vec<f32> =
         (0..1024).map(|at| 0.8 * (-((at % 32) as f32 - 15.5).powi(2) / 8.0).exp()).collect();
     let enhancer = Enhancer::built_in(&Device::cpu()).unwrap();
     let images = Images::new(&reading).unwrap();
     let made = enhancer.enhance(images, None, &Options::default(), &mut |_| {}).unwrap();
-    let widths = Intervals::shipped().unwrap().of(&made).unwrap();
+    let readings = Readings { method: "hadamard", share: 1.0, noise: 0.01 };
+    let widths = Intervals::shipped().unwrap().of(&made, &readings).unwrap();
     assert_eq!(widths.len(), AREA);
     let row = &widths[32 * 64..33 * 64];
     let (bar, ground) = (row[16..48].iter().copied().fold(0.0, f32::max), row[2]);

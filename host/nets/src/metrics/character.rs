@@ -62,12 +62,15 @@ impl CharacterJudge {
         all
     }
 
-    /// Logits of the 62 classes for each image.
+    /// Features, and logits of the 62 classes, of each image.
     #[must_use]
-    pub fn logits(&self, images: Images<'_, SIDE>) -> Vec<Vec<f32>> {
-        let images = images.values().par_chunks_exact(SIDE * SIDE);
-        let logits = |image| self.network.logits(&self.network.features(image, (SIDE, SIDE)));
-        images.map(logits).collect()
+    pub fn evidence(&self, images: Images<'_, SIDE>) -> Vec<(Vec<f32>, Vec<f32>)> {
+        let of = |image| {
+            let features = self.network.features(image, (SIDE, SIDE));
+            let logits = self.network.logits(&features);
+            (features, logits)
+        };
+        images.values().par_chunks_exact(SIDE * SIDE).map(of).collect()
     }
 
     /// Fréchet character distance between two judged stacks of at least two images each.

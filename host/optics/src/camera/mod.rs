@@ -240,10 +240,11 @@ impl CameraModel {
         file::write(self)
     }
 
-    /// A short name of the whole description: FNV-1a, 32 bit, not a checksum (Fowler, Noll and Vo).
+    /// A short name of the whole description, from its [canonical](canonical) text: FNV-1a, 32 bit,
+    /// not a checksum (Fowler, Noll and Vo).
     #[must_use]
     pub fn digest(&self) -> u32 {
-        fnv1a(format!("{self:?}").as_bytes())
+        fnv1a(canonical(self).as_bytes())
     }
 
     /// Number of detectors.
@@ -258,6 +259,30 @@ impl CameraModel {
     /// [`CameraModelError::Value`] naming the key.
     pub fn validate(&self) -> Result<(), CameraModelError> {
         file::check(self)
+    }
+}
+
+/// Data as text from which keys are made: a line `section.key = value` in TOML for each value, sorted
+/// by key. The text depends on the names and values of the data alone, not on the order of its fields
+/// (`tests::a_key_depends_on_names_and_values_alone`).
+///
+/// # Panics
+/// If the data are not a table of values, which no type of this crate is.
+#[must_use]
+pub fn canonical(data: &impl Serialize) -> String {
+    let table = toml::Table::try_from(data).expect("the data are a table of values");
+    let mut lines = Vec::new();
+    add_lines(&mut lines, "", table);
+    lines.sort();
+    lines.concat()
+}
+
+fn add_lines(lines: &mut Vec<String>, section: &str, table: toml::Table) {
+    for (key, value) in table {
+        match value {
+            toml::Value::Table(inner) => add_lines(lines, &format!("{section}{key}."), inner),
+            value => lines.push(format!("{section}{key} = {value}\n")),
+        }
     }
 }
 

@@ -203,3 +203,37 @@ fn positions_of_detectors_are_checked() {
     let eight = format!("[detector]\nfurther_mm = [{}]", "[0, 1], ".repeat(8));
     assert!(CameraModel::parse(&eight).is_err());
 }
+
+#[test]
+fn a_key_depends_on_names_and_values_alone() {
+    #[derive(Serialize)]
+    struct Inner {
+        volts: f64,
+        on: bool,
+    }
+    #[derive(Serialize)]
+    struct One {
+        name: &'static str,
+        part: Inner,
+        clocks: u8,
+    }
+    #[derive(Serialize)]
+    struct Other {
+        clocks: u8,
+        name: &'static str,
+        part: std::collections::BTreeMap<&'static str, f64>,
+    }
+    let part = Inner { volts: f64::INFINITY, on: true };
+    let one = canonical(&One { name: "lab \"2\"", part, clocks: 9 });
+    assert_eq!(one, "clocks = 9\nname = 'lab \"2\"'\npart.on = true\npart.volts = inf\n");
+    let part = [("volts", 0.1)].into();
+    let other = canonical(&Other { clocks: 9, name: "lab", part });
+    assert_eq!(other, "clocks = 9\nname = \"lab\"\npart.volts = 0.1\n");
+}
+
+/// The short name is part of the names of trained networks: another compiler or a renamed field must
+/// not change it without anybody noticing.
+#[test]
+fn the_short_name_of_a_description_is_frozen() {
+    assert_eq!(format!("{:08x}", CameraModel::paper().digest()), "cc4ce9b3");
+}

@@ -152,7 +152,7 @@ class Measurement:
                 self.n,
                 shown,
                 np.ascontiguousarray(one[read]).reshape(-1),
-                "single" if form == "single" else "pairs",
+                form,
             )
             at = np.flatnonzero(read)[np.isin(shown, kept)]
             found[frame, at] = d

@@ -44,7 +44,7 @@ def bases() -> list[str]:
 def reconstruct(
     measurement: Measurement | str | os.PathLike[str],
     *,
-    method: str = "tikhonov",
+    method: str = "auto",
     sampling: float | str = 1.0,
     order: str | None = None,
     basis: str | None = None,
@@ -56,9 +56,9 @@ def reconstruct(
     strength: float | None = None,
     as_printed: bool = False,
     non_negative: bool = False,
-    keep: str | None = None,
     warm_start: bool = False,
     matrix: Any = None,
+    dark: bool = True,
     n: int | None = None,
     device: str = "auto",
     **source: Any,
@@ -96,12 +96,12 @@ def reconstruct(
         OMP: Algorithm 1 as printed in the paper.
     non_negative : bool
         OMP: no negative light; needs the pixel basis or a dictionary.
-    keep : {"measured", "sparse"}, optional
-        Whether measured coefficients stay or take the values of the fit.
     warm_start : bool
         Start each measurement from those before it; not for ``hadamard`` and ``pseudo-inverse``.
     matrix : array_like, (M, n * n), optional
         Patterns of your own instead of Hadamard rows.
+    dark : bool
+        With ``matrix``: whether one constant, the reading without light, is fitted with the image.
     n : int, optional
         With ``matrix``: side of the image, if it is not the root of the matrix's columns.
     device : str
@@ -136,10 +136,12 @@ def reconstruct(
         strength=strength,
         as_printed=as_printed,
         non_negative=non_negative,
-        keep=keep,
         warm_start=warm_start,
+        dark=dark,
         device=device,
     )
+    if not dark and matrix is None:
+        raise Error("dark belongs to a matrix")
     is_path = isinstance(measurement, (str, os.PathLike))
     unknown = ", ".join(name for name in source if not is_path or name not in _OF_FILES)
     if unknown:
@@ -184,7 +186,7 @@ def reconstruct(
 
 def method_options(
     *,
-    method: str = "tikhonov",
+    method: str = "auto",
     sampling: float | str = 1.0,
     order: str | None = None,
     basis: str | None = None,
@@ -194,8 +196,8 @@ def method_options(
     strength: float | None = None,
     as_printed: bool = False,
     non_negative: bool = False,
-    keep: str | None = None,
     warm_start: bool = False,
+    dark: bool = True,
     device: str = "auto",
 ) -> dict[str, Any]:
     """The options of :func:`reconstruct` as the compiled part takes them."""
@@ -211,8 +213,8 @@ def method_options(
         "strength": None if strength is None else float(strength),
         "as_printed": bool(as_printed),
         "non_negative": bool(non_negative),
-        "keep": keep,
         "warm_start": bool(warm_start),
+        "dark": bool(dark),
         "device": str(device),
     }
 
@@ -261,8 +263,8 @@ def _by_matrix(readings: Any, matrix: Any, n: int | None, dictionary: Any, optio
     y = readings.d if isinstance(readings, Measurement) else _arrays.real(readings, "y")
     if y.ndim < 1 or y.shape[-1] != weights.shape[0]:
         raise Error(f"y has shape {y.shape}, expected (..., {weights.shape[0]}): one a pattern")
-    if options["warm_start"] or options["order"] is not None or options["keep"] is not None:
-        raise Error("warm_start, order and keep belong to Hadamard rows, not to a matrix")
+    if options["warm_start"] or options["order"] is not None:
+        raise Error("warm_start and order belong to Hadamard rows, not to a matrix")
     if dictionary is not None:
         options["dictionary"] = _atoms(dictionary, n)
     pixels, reports = _nirspi.reconstruct_matrix(

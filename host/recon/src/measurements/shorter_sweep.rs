@@ -90,7 +90,10 @@ impl ShorterSweep {
         };
         let values = measurements.values();
         let values = positions.iter().map(|&k| values[k]).collect();
-        Measurements::trusted(self.shown.clone(), values)
+        Measurements {
+            noise: measurements.noise(),
+            ..Measurements::trusted(self.shown.clone(), values)
+        }
     }
 
     /// As [`of`](Self::of), without a copy if the shorter sweep shows all patterns.

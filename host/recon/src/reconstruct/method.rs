@@ -11,9 +11,7 @@
 
 use super::prior::SharedNetwork;
 use super::report::{Reconstruction, Report};
-use super::{
-    Completion, MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength, methods,
-};
+use super::{MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength, methods};
 use crate::{Backend, Basis, Measurements};
 use std::fmt;
 use std::str::FromStr;
@@ -31,7 +29,7 @@ use thiserror::Error;
 /// nirspi_recon::fwht(&mut scene)?;
 /// let all = Measurements::from_differential(&Rows::natural(side), &scene)?;
 /// let part = all.take(Some(&Order::ZigZag), 0.3)?;
-/// for method in Method::ALL {
+/// for method in Method::ALL.iter().filter(|method| !method.needs_network()) {
 ///     let found = method.prepare(&MethodSettings::default())?.reconstruct(&part)?;
 ///     println!("{}", found.report);
 /// }
@@ -65,6 +63,19 @@ pub trait Reconstruct: Send + Sync {
         let made = self.reconstruct(measurements)?;
         pixels.copy_from_slice(made.image.pixels());
         Ok(made.report)
+    }
+
+    /// For a method that chooses among others: the choice for measurements like `first`, for a stack
+    /// of such measurements, which it would be slow to judge one by one. `None`: every other method
+    /// is its own choice.
+    ///
+    /// # Errors
+    /// As [`Reconstruct::reconstruct`].
+    fn settled(
+        &self,
+        _first: &Measurements,
+    ) -> Result<Option<Arc<dyn Reconstruct>>, ReconstructError> {
+        Ok(None)
     }
 
     /// What the frames of a video have shown before the first frame, for
@@ -139,10 +150,14 @@ impl Method {
     /// Orthogonal matching pursuit, the paper's method.
     pub const OMP: Self = methods::OMP;
 
-    /// Tikhonov's method, the default: `docs/reconstruction.md` has the comparison.
+    /// The method that held-back readings choose, the default.
+    pub const AUTO: Self = methods::AUTO;
+
+    /// Tikhonov's method, with a covariance prior.
     pub const TIKHONOV: Self = methods::TIKHONOV;
 
-    /// The learned prior, which needs [`MethodSettings::network`].
+    /// The learned prior, which needs [`MethodSettings::network`]; `nirspi_nets::prior::settings`
+    /// has the shipped one.
     pub const PRIOR: Self = methods::PRIOR;
 
     /// The method's name in a few words, for example `total variation`.
@@ -163,6 +178,13 @@ impl Method {
         self.0.about
     }
 
+    /// Whether the method needs [`MethodSettings::network`], without which
+    /// [`prepare`](Self::prepare) is an error.
+    #[must_use]
+    pub fn needs_network(self) -> bool {
+        self == Self::PRIOR
+    }
+
     /// Whether the method uses a setting.
     #[must_use]
     pub fn takes(self, setting: Setting) -> bool {
@@ -180,7 +202,7 @@ impl Method {
     ///
     /// # Errors
     /// [`ReconstructError`] if a setting is out of range, belongs to another method, or names a GPU
-    /// that is missing.
+    /// that is missing, and if the method needs a network and the settings hold none.
     pub fn prepare(
         self,
         settings: &MethodSettings,
@@ -205,7 +227,7 @@ impl Method {
 
 impl Default for Method {
     fn default() -> Self {
-        Self::TIKHONOV
+        Self::AUTO
     }
 }
 
@@ -312,15 +334,10 @@ pub struct MethodSettings {
     pub non_negative: bool,
     /// How strong a penalty is.
     pub strength: Strength,
-    /// Whether measured rows keep their values or take those of the fit. `None` means
-    /// [`Completion::Measured`], except for Algorithm 1 as printed and for non-negative
-    /// coefficients: there `None` means [`Completion::Sparse`], because noise of the measured rows
-    /// would make pixels negative.
-    pub completion: Option<Completion>,
     /// The backend.
     pub backend: Backend,
-    /// The learned prior's network. Other methods ignore it. `nirspi_nets::prior::shipped` is the
-    /// shipped one; without any, `prior` is Tikhonov's method, and its report says so.
+    /// The learned prior's network. Other methods ignore it. `nirspi_nets::prior::settings` gives
+    /// settings that hold the shipped one; without any, [`Method::PRIOR`] cannot be prepared.
     pub network: Option<SharedNetwork>,
 }
 
@@ -335,7 +352,6 @@ impl Default for MethodSettings {
             as_printed: false,
             non_negative: false,
             strength: Strength::default(),
-            completion: None,
             backend,
             network: None,
         }
@@ -401,14 +417,6 @@ impl MethodSettings {
             }
         }
         taken
-    }
-
-    /// Whether measured rows keep their values or take those of the fit.
-    #[must_use]
-    pub fn completion(&self) -> Completion {
-        let sparse = self.as_printed || self.non_negative;
-        let default = if sparse { Completion::Sparse } else { Completion::Measured };
-        self.completion.unwrap_or(default)
     }
 }
 

@@ -32,14 +32,16 @@ pub fn omp_over(
         let found = atoms[index].into();
         return Err(OmpError::NotFinite { field: "dictionary", index, found }.into());
     }
-    let mut problem = Problem::of(measurements, Basis::Pixel, 0.0, settings.noise);
+    let mut problem = Problem::of(measurements, Basis::Pixel, Some(0.0), settings.noise);
     problem.residual = settings.residual;
-    problem.to_noise = settings.sparsity == Sparsity::Noise;
+    problem.stop_at_noise(settings.sparsity, measurements);
     problem.how = settings.how();
     let shown = Shown::new(&problem, atoms);
     let choice = match settings.sparsity {
-        Sparsity::Fixed(atoms) => selection::Choice { atoms, trust: 1.0 },
-        Sparsity::Noise => selection::Choice { atoms: problem.rows.len(), trust: 1.0 },
+        Sparsity::Fixed(atoms) => selection::Choice { atoms, trust: 1.0, held_back: None },
+        Sparsity::Noise => {
+            selection::Choice { atoms: problem.rows.len(), trust: 1.0, held_back: None }
+        }
         Sparsity::CrossValidated { most, folds } => {
             selection::choose_sparsity(&problem, most, folds, |kept, sparsities| {
                 let found = shown.pursue(&problem, kept, sparsities)?;
@@ -50,7 +52,7 @@ pub fn omp_over(
     let every: Vec<usize> = (0..problem.rows.len()).collect();
     let found = shown.pursue(&problem, &every, &[choice.atoms])?.remove(0);
     let predicted = shown.predict(&found);
-    Ok(reconstruction(&problem, found, predicted, settings.completion, choice.trust))
+    Ok(reconstruction(&problem, found, predicted, settings, &choice))
 }
 
 /// Measurements of the atoms, of unit norm, by every row: `rows x atoms`.

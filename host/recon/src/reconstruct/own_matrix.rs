@@ -7,6 +7,17 @@
 //! (`tests::units_of_patterns_and_measurements_do_not_matter`). The mean of the image, which
 //! patterns of zeros and ones measure far better than any detail, has no penalty.
 //!
+//! # The dark level
+//! A detector reads something without light: ambient light, the offset of an amplifier. It is one
+//! unknown constant beside the image, without a penalty: `y = A x + dark`. So the image does not depend
+//! on it (`tests::a_dark_level_changes_no_image`). Two cases need a choice:
+//!
+//! - The weights of all patterns have the same sum. Then a dark level looks like the mean of the image:
+//!   it counts as light, [`DarkLevel::Unknown`]. If that sum is 0, no pattern sees the mean.
+//! - The pseudo-inverse of as few patterns as pixels, or fewer, explains any constant by some image. All
+//!   rows of a Hadamard matrix explain it by one bright pixel. The dark level is then that of the
+//!   smoothest image, [`DarkLevel::Smoothest`]. Penalties choose by themselves.
+//!
 //! # Methods
 //!
 //! `A` are the patterns, one in each row, `y` the measurements, `c` the coefficients of the image
@@ -32,7 +43,7 @@ use crate::basis::Basis;
 use crate::omp::{OmpError, Stop};
 use crate::{Image, Side};
 use nalgebra::{DMatrix, DVector};
-use problem::Problem;
+use problem::{Fit, Problem};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -133,6 +144,8 @@ pub struct MatrixSettings {
     pub sparsity: Option<usize>,
     /// Whether OMP's coefficients must be non-negative.
     pub non_negative: bool,
+    /// Whether a dark level is fitted with the image.
+    pub dark: bool,
 }
 
 impl MatrixSettings {
@@ -140,7 +153,15 @@ impl MatrixSettings {
     #[must_use]
     pub fn new(method: MatrixMethod) -> Self {
         let (atoms, strength, sparsity) = (None, None, None);
-        Self { method, basis: Basis::Dct, atoms, strength, sparsity, non_negative: false }
+        Self {
+            method,
+            basis: Basis::Dct,
+            atoms,
+            strength,
+            sparsity,
+            non_negative: false,
+            dark: true,
+        }
     }
 }
 
@@ -153,8 +174,49 @@ pub struct MatrixReconstruction {
     pub strength: Option<f64>,
     /// For OMP, the number of atoms and why the pursuit stopped.
     pub atoms: Option<(usize, Stop)>,
-    /// Norm of the residual, relative to the measurements' norm.
+    /// The dark level.
+    pub dark: DarkLevel,
+    /// Norm of the residual, relative to the norm of the measurements without the dark level.
     pub residual: f64,
+}
+
+/// The detector's reading without light, in the measurements' units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DarkLevel {
+    /// The settings leave it out: it counts as 0.
+    LeftOut,
+    /// The level that fits the measurements best.
+    Fitted(f64),
+    /// Images explain any level; this one gives the smoothest image.
+    Smoothest(f64),
+    /// All patterns have the same sum of weights, so that the level looks like the mean of the image. It
+    /// counts as 0.
+    Unknown,
+}
+
+impl DarkLevel {
+    /// The level that was subtracted from the measurements.
+    #[must_use]
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Fitted(level) | Self::Smoothest(level) => level,
+            Self::LeftOut | Self::Unknown => 0.0,
+        }
+    }
+
+    /// What the user should know about the level beside its value.
+    #[must_use]
+    pub fn note(self) -> Option<&'static str> {
+        match self {
+            Self::LeftOut | Self::Fitted(_) => None,
+            Self::Smoothest(_) => Some(
+                "the patterns are too few to measure a dark level: it is that of the smoothest image that fits",
+            ),
+            Self::Unknown => Some(
+                "the weights of all patterns have the same sum: a dark level cannot be told from the mean of the image and is a part of the mean",
+            ),
+        }
+    }
 }
 
 /// Strengths to try, the strongest first.
@@ -176,6 +238,13 @@ const SPARSITIES: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 200, 300];
 /// Smallest pivot of the Gram matrix, relative to the largest, for which a pattern counts as
 /// linearly independent.
 const NEW: f64 = 1e-11;
+
+/// Relative difference of sums of weights that counts as rounding.
+const SAME_SUM: f64 = 1e-9;
+
+/// Part of the energy of a constant that images must leave unexplained for the measurements to say
+/// something of a dark level.
+const UNEXPLAINED: f64 = 1e-6;
 
 impl OwnMatrix {
     /// A matrix from the weights of one pattern after another, row-major.
@@ -239,14 +308,9 @@ impl OwnMatrix {
         finite("y", y, 1)?;
         self.check(settings)?;
         let every: Vec<usize> = (0..y.len()).collect();
-        let (pixels, strength, atoms) = match settings.method {
+        let (fit, strength, atoms) = match settings.method {
             MatrixMethod::PseudoInverse => {
-                let y = DVector::from_column_slice(y);
-                let pixels = match &self.orthogonal {
-                    Some(energies) => self.patterns.tr_mul(&y.component_div(energies)),
-                    None => solvers::least_squares(&self.patterns, &y),
-                };
-                (pixels, None, None)
+                (self.pseudo_inverse(&DVector::from_column_slice(y), settings.dark), None, None)
             }
             MatrixMethod::Omp => {
                 let noise = match settings.strength {
@@ -265,8 +329,8 @@ impl OwnMatrix {
                 };
                 let problem = Problem::new(self, settings, y, &every);
                 let mut found = problem.omp(noise, &[sparsity], settings.non_negative)?;
-                let (pixels, size, stop) = found.remove(0);
-                (pixels, Some(noise), Some((size, stop)))
+                let (fit, size, stop) = found.remove(0);
+                (fit, Some(noise), Some((size, stop)))
             }
             MatrixMethod::Penalty(penalty) => {
                 // The list of strengths is the same as in the comparison, because iterative methods
@@ -279,16 +343,49 @@ impl OwnMatrix {
                     }
                 };
                 let problem = Problem::new(self, settings, y, &every);
-                let pixels =
-                    problem.penalised(penalty, &strengths).swap_remove(strengths.len() - 1);
-                (pixels, strengths.last().copied(), None)
+                let fit = problem.penalised(penalty, &strengths).swap_remove(strengths.len() - 1);
+                (fit, strengths.last().copied(), None)
             }
         };
-        let y = DVector::from_column_slice(y);
+        let Fit { pixels, dark } = fit;
+        let y = DVector::from_column_slice(y).add_scalar(-dark.value());
         let left = (&y - &self.patterns * &pixels).norm();
         let residual = if y.norm() > 0.0 { left / y.norm() } else { 0.0 };
         let image = Image::new(self.side, pixels.iter().map(|&v| v as f32).collect());
-        Ok(MatrixReconstruction { image, strength, atoms, residual })
+        Ok(MatrixReconstruction { image, strength, atoms, dark, residual })
+    }
+
+    /// The image of least norm, and the dark level.
+    fn pseudo_inverse(&self, y: &DVector<f64>, fits_dark: bool) -> Fit {
+        let invert = |y: &DVector<f64>| match &self.orthogonal {
+            Some(energies) => self.patterns.tr_mul(&y.component_div(energies)),
+            None => solvers::least_squares(&self.patterns, y),
+        };
+        let pixels = invert(y);
+        if !fits_dark {
+            return Fit { pixels, dark: DarkLevel::LeftOut };
+        }
+        let sums = self.patterns.column_sum();
+        let weight = sums.mean();
+        if weight != 0.0 && sums.iter().all(|sum| (sum - weight).abs() <= SAME_SUM * weight.abs()) {
+            // An even image explains what all measurements have in common.
+            let level = y.mean();
+            let pixels = invert(&y.add_scalar(-level)).add_scalar(level / weight);
+            return Fit { pixels, dark: DarkLevel::Unknown };
+        }
+        // The image that a dark level of 1 looks like, and what no image explains of it.
+        let ones = DVector::from_element(y.len(), 1.0);
+        let ghost = invert(&ones);
+        let unexplained = &ones - &self.patterns * &ghost;
+        let dark = if unexplained.norm_squared() > UNEXPLAINED * y.len() as f64 {
+            DarkLevel::Fitted(unexplained.dot(y) / unexplained.norm_squared())
+        } else {
+            match solvers::smoothest(self.side, &pixels, &ghost) {
+                Some(level) => DarkLevel::Smoothest(level),
+                None => DarkLevel::Unknown,
+            }
+        };
+        Fit { pixels: pixels - ghost * dark.value(), dark }
     }
 
     fn check(&self, settings: &MatrixSettings) -> Result<(), MatrixError> {
@@ -331,7 +428,7 @@ impl OwnMatrix {
         let sparsities: Vec<usize> = SPARSITIES.into_iter().filter(|&k| k <= y.len()).collect();
         let predict = |problem: &Problem| {
             let found = problem.omp(noise, &sparsities, settings.non_negative)?;
-            Ok(found.into_iter().map(|(pixels, ..)| pixels).collect())
+            Ok(found.into_iter().map(|(fit, ..)| fit).collect())
         };
         Ok(sparsities[last_as_good(&self.errors(y, settings, sparsities.len(), predict)?)])
     }
@@ -343,7 +440,7 @@ impl OwnMatrix {
         y: &[f64],
         settings: &MatrixSettings,
         count: usize,
-        predict: impl Fn(&Problem) -> Result<Vec<DVector<f64>>, MatrixError>,
+        predict: impl Fn(&Problem) -> Result<Vec<Fit>, MatrixError>,
     ) -> Result<Vec<f64>, MatrixError> {
         let mut shuffled: Vec<usize> = (0..y.len()).collect();
         shuffled.shuffle(&mut Pcg64::seed_from_u64(SPLIT_SEED));
@@ -358,9 +455,9 @@ impl OwnMatrix {
                 continue;
             }
             let images = predict(&Problem::new(self, settings, y, &kept))?;
-            for (error, pixels) in errors.iter_mut().zip(images) {
-                let miss =
-                    |&k: &usize| (y[k] - self.patterns.row(k).transpose().dot(&pixels)).powi(2);
+            for (error, Fit { pixels, dark }) in errors.iter_mut().zip(images) {
+                let seen = |k: usize| self.patterns.row(k).transpose().dot(&pixels) + dark.value();
+                let miss = |&k: &usize| (y[k] - seen(k)).powi(2);
                 *error += held.iter().map(miss).sum::<f64>();
             }
         }

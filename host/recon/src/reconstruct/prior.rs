@@ -5,18 +5,19 @@
 //!    Tikhonov's image at strength 1.
 //! 2. The network gives every coefficient. This crate has no network of its own: `nirspi-nets` has
 //!    the shipped one, and [`Network`] is the interface for others.
-//! 3. A measured coefficient keeps the network's value only within [`WITHIN`] times the noise that
-//!    is estimated from the measurements.
+//! 3. A measured coefficient is the weighted mean of its reading and of what the network says without
+//!    it, within [`WITHIN`](super::WITHIN) times the reading's noise. Without noise it is the reading.
 //! 4. The network completes the measurements a second time without every other row of their finest
 //!    quarter. The share of the way from the start to the network's image that predicts these rows
 //!    best, plus one standard error, is the trust: 0 is the start, 1 the network's image.
 //!
 //! # Invariant
 //! Whatever the network gives, a measured coefficient of the image differs from its measurement by
-//! at most [`WITHIN`] times the noise (`tests::measured_values_stay_within_their_noise`), gain and
+//! at most [`WITHIN`](super::WITHIN) times the noise (`tests::measured_values_stay_within_their_noise`), gain and
 //! offset of the measurements are those of the image (`tests::gain_and_offset_go_through`), and
-//! measurements that the network cannot take give Tikhonov's image and a line that says so
-//! (`tests::what_the_network_cannot_take_is_tikhonov_and_says_so`).
+//! measurements with too few patterns or without contrast give Tikhonov's image and a line that says
+//! so (`tests::what_the_network_cannot_complete_is_tikhonov_and_says_so`). A side that the network
+//! does not complete is an error (`tests::a_side_that_the_network_does_not_take_is_an_error`).
 
 mod seen;
 
@@ -24,21 +25,21 @@ pub use seen::Seen;
 
 use super::selection::Line;
 use super::{
-    Completion, Penalty, ReconstructError, Reconstruction, RegularisedSettings, Report, regularised,
+    Penalty, ReconstructError, Reconstruction, RegularisedSettings, Report, noise, regularised,
+    selection,
 };
 use crate::{Image, Measurements, Side, fwht, order, words};
 use std::fmt;
 use std::sync::Arc;
-
-/// Distance of a coefficient from its measurement that is allowed, in standard deviations of the
-/// estimated noise.
-pub const WITHIN: f32 = 2.0;
 
 /// The fewest patterns that a network completes: the estimates of noise and trust need some.
 pub const LEAST_PATTERNS: usize = 40;
 
 /// The least share of the patterns that a network completes. Training has 5 % and more.
 pub const LEAST_SHARE: f64 = 0.03;
+
+/// Number of parts of the measurements, each of which is held back once.
+const FOLDS: usize = 4;
 
 /// Trust below this is none: the image would differ from the start by less than the start's error.
 const LEAST_TRUST: f32 = 0.05;
@@ -89,21 +90,25 @@ impl PartialEq for SharedNetwork {
 }
 
 /// Reconstructs an image with a network, as far as held-back measurements support the network.
-/// `completion` is what becomes of measured coefficients; `None` keeps them within their noise.
-/// Without a network, or where the network cannot be used, the image is Tikhonov's, and
-/// [`Report::note`] says why.
+/// Where the patterns are too few, show no contrast or do not support the network, the image is
+/// Tikhonov's, and [`Report::note`] says why.
 ///
 /// # Errors
+/// [`ReconstructError::NetworkSide`] if the network does not complete images of this side, and
 /// [`ReconstructError::Failed`] if the network gives no image.
 pub fn with_network(
     measurements: &Measurements,
-    network: Option<&dyn Network>,
-    completion: Option<Completion>,
+    network: &dyn Network,
     name: &str,
 ) -> Result<Reconstruction, ReconstructError> {
-    let (network, seen) = match usable(measurements, network) {
-        Ok(usable) => usable,
-        Err(why) => return classical(measurements, completion, name, &why),
+    let side = measurements.side();
+    if !network.takes(side) {
+        let network = network.name().to_owned();
+        return Err(ReconstructError::NetworkSide { network, side: side.pixels() });
+    }
+    let seen = match completable(measurements) {
+        Ok(seen) => seen,
+        Err(why) => return classical(measurements, name, &why),
     };
     let complete = |seen: &Seen| network.complete(seen).map_err(ReconstructError::Failed);
     let trust = match held_back(measurements) {
@@ -115,73 +120,75 @@ pub fn with_network(
     };
     if trust < LEAST_TRUST {
         let why = "held-back measurements do not support the network";
-        return classical(measurements, completion, name, why);
+        return classical(measurements, name, why);
     }
     let mut grid = complete(&seen)?;
-    for (row, value) in grid.iter_mut().enumerate() {
-        let start = seen.start()[row];
-        if seen.mask()[row] == 0.0 {
-            *value = start + trust * (*value - start);
-            continue;
-        }
-        let from = *value - seen.values()[row];
-        let within = WITHIN * seen.noise();
-        *value = seen.values()[row]
-            + trust
-                * match completion {
-                    None => from.clamp(-within, within),
-                    Some(Completion::Measured) => 0.0,
-                    Some(Completion::Sparse) => from,
-                };
+    believe(&seen, trust, &mut grid);
+    let held_back = without_each(measurements, &seen, trust, &complete)?;
+    for (&row, &predicted) in measurements.rows().iter().zip(&held_back) {
+        grid[row as usize] = predicted;
     }
+    let noise = noise::estimated_noise(measurements);
     let mut report = Report::new(name);
-    report.completion = completion;
+    report.held_back = seen.judge(measurements.rows(), &held_back);
+    report.reading_weight = Some(seen.weigh(measurements.rows(), noise, &mut grid));
     report.trust = Some(f64::from(trust));
-    report.noise = Some(seen.noise_in_units());
+    report.noise = Some(noise);
     report.residual = Some(seen.residual(&grid));
     Ok(Reconstruction { image: image(&seen, grid), report })
 }
 
-/// The network and what it is given; or why there is no use for the network.
-fn usable<'n>(
-    measurements: &Measurements,
-    network: Option<&'n dyn Network>,
-) -> Result<(&'n dyn Network, Seen), String> {
-    let Some(network) = network else {
-        return Err("no network was given".to_owned());
-    };
-    let (side, count) = (measurements.side(), measurements.rows().len());
-    let n = side.pixels();
-    if !network.takes(side) {
-        return Err(format!("the network {} does not take {n} x {n} pixels", network.name()));
+/// Goes from the start to the completion as far as the completion is believed.
+fn believe(seen: &Seen, trust: f32, completed: &mut [f32]) {
+    for (value, start) in completed.iter_mut().zip(seen.start()) {
+        *value = start + trust * (*value - start);
     }
-    let least = LEAST_PATTERNS.max((LEAST_SHARE * side.area() as f64).ceil() as usize);
+}
+
+/// What the network predicts for each measurement without it, in the units of `seen`.
+fn without_each(
+    measurements: &Measurements,
+    seen: &Seen,
+    trust: f32,
+    complete: &impl Fn(&Seen) -> Result<Vec<f32>, ReconstructError>,
+) -> Result<Vec<f32>, ReconstructError> {
+    let rows = measurements.rows();
+    let mut predicted: Vec<f32> = rows.iter().map(|&row| seen.values()[row as usize]).collect();
+    for (kept, held) in selection::parts(rows, FOLDS) {
+        let Some(part) = Seen::new(&measurements.subset(kept)) else { continue };
+        let mut completed = complete(&part)?;
+        believe(&part, trust, &mut completed);
+        let factor = (part.unit() / seen.unit()) as f32;
+        for k in held {
+            predicted[k] = completed[rows[k] as usize] * factor;
+        }
+    }
+    Ok(predicted)
+}
+
+/// What a network is given; or why there is no use for a network.
+fn completable(measurements: &Measurements) -> Result<Seen, String> {
+    let (area, count) = (measurements.side().area(), measurements.rows().len());
+    let least = LEAST_PATTERNS.max((LEAST_SHARE * area as f64).ceil() as usize);
     if count < least {
         return Err(format!(
             "{} measured, expected at least {least} for the network",
             words::count_of(count, "pattern")
         ));
     }
-    match Seen::new(measurements) {
-        Some(seen) => Ok((network, seen)),
-        None => Err("the measurements show no contrast".to_owned()),
-    }
+    Seen::new(measurements).ok_or_else(|| "the measurements show no contrast".to_owned())
 }
 
 /// Tikhonov's image, with the reason for it.
 fn classical(
     measurements: &Measurements,
-    completion: Option<Completion>,
     name: &str,
     why: &str,
 ) -> Result<Reconstruction, ReconstructError> {
-    let settings = RegularisedSettings {
-        completion: completion.unwrap_or(Completion::Measured),
-        ..RegularisedSettings::new(Penalty::Tikhonov)
-    };
-    let found = regularised(measurements, &settings)?;
+    let found = regularised(measurements, &RegularisedSettings::new(Penalty::Tikhonov))?;
     let mut report = Report::new(name);
-    report.completion = Some(settings.completion);
+    report.reading_weight = Some(found.reading_weight);
+    report.held_back = found.held_back;
     report.residual = Some(found.residual);
     report.noise = Some(found.noise);
     report.note = Some(format!("Tikhonov instead: {why}"));

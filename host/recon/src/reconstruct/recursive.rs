@@ -37,7 +37,7 @@ mod view;
 
 use super::regularised::tikhonov;
 use super::{
-    Completion, NoiseLevel, Penalty, Problem, Reconstruct, ReconstructError, Reconstruction,
+    NoiseLevel, Penalty, Problem, Reconstruct, ReconstructError, Reconstruction,
     RegularisedSettings, Strength, regularised,
 };
 use crate::basis::Basis;
@@ -61,9 +61,6 @@ pub struct RecursiveSettings {
     /// Strength of the penalty. A cross-validated strength is chosen for frames without a past;
     /// later frames take 1, what noise and prior call for.
     pub strength: Strength,
-    /// Whether rows that are known at least as well as by one reading keep their fused values, or
-    /// take those of the fit.
-    pub completion: Completion,
     /// Speed in pixels a frame; `None`: the likeliest for each frame.
     pub speed_px: Option<f64>,
     /// Whether the estimate is moved with the scene.
@@ -75,7 +72,6 @@ impl Default for RecursiveSettings {
         Self {
             noise: NoiseLevel::Estimated,
             strength: Strength::default(),
-            completion: Completion::Measured,
             speed_px: None,
             follow: true,
         }
@@ -104,6 +100,9 @@ pub struct RecursiveFrame {
     /// Norm of the difference between this frame's measurements and the image, relative to the
     /// measurements' norm.
     pub residual: f64,
+    /// Mean weight of the readings in the rows that are known at least as well as by one reading. A
+    /// frame with a past keeps their fused values.
+    pub reading_weight: f64,
     /// Noise of a measurement, in the measurements' units.
     pub noise: f64,
     /// Strength of the penalty.
@@ -223,7 +222,7 @@ impl Recursive {
             return Err(ReconstructError::Setting { setting, found, expected });
         }
         settings.strength.check()?;
-        super::check_prior(FALLOFF, settings.noise)?;
+        super::check_prior(Some(FALLOFF), settings.noise)?;
         Ok(Self { settings, past: None, begun: false, belief: Belief::default() })
     }
 
@@ -258,11 +257,10 @@ impl Recursive {
 
     /// The first frame of a scene.
     fn start(&mut self, frame: &Measurements) -> Result<RecursiveFrame, ReconstructError> {
-        let RecursiveSettings { noise, strength, completion, .. } = self.settings;
+        let RecursiveSettings { noise, strength, .. } = self.settings;
         let base = RegularisedSettings::new(Penalty::Tikhonov);
-        let found =
-            regularised(frame, &RegularisedSettings { noise, strength, completion, ..base })?;
-        let problem = Problem::of(frame, Basis::Dct, FALLOFF, noise);
+        let found = regularised(frame, &RegularisedSettings { noise, strength, ..base })?;
+        let problem = Problem::of(frame, Basis::Dct, Some(FALLOFF), noise);
         let scale = (1.0 / problem.unit) as f32;
         let mut mean: Vec<f32> = found.image.pixels().iter().map(|v| v * scale).collect();
         walsh(problem.side, &mut mean);
@@ -290,6 +288,7 @@ impl Recursive {
             fused: frame.clone(),
             certain: frame.clone(),
             residual: found.residual,
+            reading_weight: found.reading_weight,
             noise: found.noise,
             strength: found.strength,
         })
@@ -370,15 +369,14 @@ impl Recursive {
         let share = past.share_of_last(noise, Some(prior));
         past.mean = past.with_readings(made.clone(), &share);
         let [fused, certain] = past.fused(noise, prior);
-        if self.settings.completion == Completion::Measured {
-            let known = &past.poses[0].known;
-            if past.poses.len() > 1 {
-                made.clone_from(&past.mean);
-            } else {
-                for (row, precision) in known.precision(noise).into_iter().enumerate() {
-                    if precision * noise.powi(2) >= 0.999 {
-                        made[row] = known.value[row];
-                    }
+        // Fused values are means of several readings already, so they stay as they are.
+        let known = &past.poses[0].known;
+        if past.poses.len() > 1 {
+            made.clone_from(&past.mean);
+        } else {
+            for (row, precision) in known.precision(noise).into_iter().enumerate() {
+                if precision * noise.powi(2) >= 0.999 {
+                    made[row] = known.value[row];
                 }
             }
         }
@@ -397,6 +395,7 @@ impl Recursive {
             fused,
             certain,
             residual,
+            reading_weight: 1.0,
             noise: f64::from(noise) * unit * side.pixels() as f64,
             strength,
         }

@@ -18,8 +18,8 @@ mod fista;
 pub(super) mod tikhonov;
 pub(super) mod total_variation;
 
-use super::selection::{self, TRUST, Trusted};
-use super::{Completion, NoiseLevel, Problem, ReconstructError, image_of};
+use super::selection::{self, Chosen, TRUST, Trusted};
+use super::{HeldBack, Made, NoiseLevel, Problem, ReconstructError};
 use crate::basis::Basis;
 use crate::{Image, Measurements, fwht, words};
 
@@ -89,12 +89,11 @@ pub struct RegularisedSettings {
     pub basis: Basis,
     /// Strength of the penalty.
     pub strength: Strength,
-    /// Power of the frequency with which coefficients are expected to fall.
-    pub falloff: f64,
+    /// Power of the frequency with which coefficients are expected to fall; `None`: the power that
+    /// the measurements themselves make likely.
+    pub falloff: Option<f64>,
     /// Noise of the measurements.
     pub noise: NoiseLevel,
-    /// Whether measured rows keep their values or take those of the fit.
-    pub completion: Completion,
     /// Largest number of iterations.
     pub iterations: usize,
 }
@@ -107,9 +106,8 @@ impl RegularisedSettings {
             penalty,
             basis: Basis::Dct,
             strength: Strength::default(),
-            falloff: 1.0,
+            falloff: None,
             noise: NoiseLevel::Estimated,
-            completion: Completion::Measured,
             iterations: 200,
         }
     }
@@ -133,9 +131,14 @@ pub struct Regularised {
     pub strength: f64,
     /// Trust: factor on the prediction for rows that were not measured, 0 (zero filling) to 1.
     pub trust: f64,
-    /// Norm of the difference between the measurements and the prediction, relative to the
-    /// measurements' norm.
+    /// Norm of the difference between the measurements and the image, relative to the measurements'
+    /// norm.
     pub residual: f64,
+    /// Mean weight of the readings in the measured rows: 1 where noise does not matter, 0 where the
+    /// image is the fit.
+    pub reading_weight: f64,
+    /// How well readings were predicted without them; `None` if none was held back.
+    pub held_back: Option<HeldBack>,
     /// Noise of a measurement, estimated or given, in the measurements' units.
     pub noise: f64,
 }
@@ -160,8 +163,8 @@ pub fn regularised(
             total_variation::predict(&problem, positions, strengths, settings.iterations)
         }
     };
-    let (at, trust, strengths) = match settings.strength {
-        Strength::Fixed(strength) => (0, 1.0, vec![strength as f32]),
+    let (at, trust, strengths, held_back) = match settings.strength {
+        Strength::Fixed(strength) => (0, 1.0, vec![strength as f32], None),
         Strength::CrossValidated { folds } => {
             // Total variation draws edges into plain noise, so it gets the lowest limit. A limit on
             // the sparse penalty helps nowhere and costs 0.001 of correlation on real
@@ -175,25 +178,30 @@ pub fn regularised(
                 selection::choose_among(&problem, STRENGTHS.len(), folds, trusted, |kept| {
                     Ok(predict(kept, &STRENGTHS))
                 })?;
-            let (at, trust) = choice.unwrap_or((0, TRUST[0]));
-            (at, trust, STRENGTHS[..=at].to_vec())
+            match choice {
+                None => (0, TRUST[0], STRENGTHS[..1].to_vec(), None),
+                Some(Chosen { at, trust, held_back }) => {
+                    (at, trust, STRENGTHS[..=at].to_vec(), Some(held_back))
+                }
+            }
         }
     };
     let every: Vec<usize> = (0..problem.rows.len()).collect();
     let mut predictions = predict(&every, &strengths);
     let predicted = predictions.swap_remove(at);
-    let residual = problem.residual_of(&predicted);
-    let noise = problem.noise_in_units();
-    let image = image_of(&problem, predicted, settings.completion, trust);
+    let judged = problem.judge(held_back.as_deref(), trust);
+    let made = Made::weighted(&problem, predicted, trust, held_back.as_deref());
     Ok(Regularised {
-        image,
+        image: made.image,
         strength: match settings.strength {
             Strength::Fixed(strength) => strength,
             Strength::CrossValidated { .. } => words::shortest(strengths[at]),
         },
         trust: f64::from(trust),
-        residual,
-        noise,
+        residual: made.residual,
+        reading_weight: made.reading_weight,
+        held_back: judged,
+        noise: problem.noise_in_units(),
     })
 }
 

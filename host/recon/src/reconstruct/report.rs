@@ -1,6 +1,6 @@
 //! A method's report on its image, in numbers and in words.
 
-use super::Completion;
+use super::HeldBack;
 use crate::words::count_of;
 use crate::{Backend, Image};
 use std::fmt;
@@ -31,12 +31,17 @@ pub struct Report {
     pub strength: Option<f64>,
     /// Number of atoms in the representation.
     pub sparsity: Option<usize>,
-    /// Whether measured rows kept their values.
-    pub completion: Option<Completion>,
+    /// Mean weight of the readings in the measured rows: 1 where noise does not matter, 0 where the
+    /// image is the prediction.
+    pub reading_weight: Option<f64>,
+    /// How well readings were predicted without them; `None` if none was held back.
+    pub held_back: Option<HeldBack>,
+    /// The method's word, if it was chosen among several.
+    pub chosen: Option<&'static str>,
     /// Why the pursuit stopped.
     pub stop: Option<&'static str>,
-    /// Norm of the difference between the measurements and the prediction, relative to the
-    /// measurements' norm.
+    /// Norm of the difference between the measurements and the image, relative to the measurements'
+    /// norm.
     pub residual: Option<f64>,
     /// Number of atoms that the measured rows do not see.
     pub unseen_atoms: Option<usize>,
@@ -60,7 +65,9 @@ impl Report {
             device: None,
             strength: None,
             sparsity: None,
-            completion: None,
+            reading_weight: None,
+            held_back: None,
+            chosen: None,
             stop: None,
             residual: None,
             unseen_atoms: None,
@@ -89,13 +96,18 @@ impl Report {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts = vec![self.short()];
+        parts.extend(self.chosen.map(|word| format!("chosen by held-back readings: {word}")));
         parts.extend(self.strength.map(|strength| format!("strength {strength}")));
         parts.extend(self.residual.map(|residual| format!("relative residual {residual:.3}")));
         parts
             .extend(self.unseen_atoms.map(|atoms| format!("{} not seen", count_of(atoms, "atom"))));
-        parts.extend(
-            self.trust.map(|trust| format!("{:.0} % of the prediction used", 100.0 * trust)),
-        );
+        parts
+            .extend(self.reading_weight.map(|weight| {
+                format!("measured patterns: readings count {:.0} %", 100.0 * weight)
+            }));
+        parts.extend(self.trust.map(|trust| {
+            format!("patterns that were not measured: prediction counts {:.0} %", 100.0 * trust)
+        }));
         parts.extend(self.stop.map(|stop| format!("stopped: {stop}")));
         parts.extend(self.note.clone());
         f.write_str(&parts.join(", "))
@@ -118,7 +130,7 @@ mod tests {
         assert_eq!(report.short(), "an invention, haar basis");
         assert_eq!(
             report.to_string(),
-            "an invention, haar basis, strength 3, relative residual 0.250, 50 % of the prediction used"
+            "an invention, haar basis, strength 3, relative residual 0.250, patterns that were not measured: prediction counts 50 %"
         );
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn parts() -> Vec<(&'static str, Measurements)> {
     vec![
         ("blobs", part(16, 1, Order::ZigZag, 80, 0.3)),
         ("figure", part(16, 2, Order::CakeCutting, 130, 0.1)),
-        ("at random", part(16, 2, Order::Random(3), 100, 0.02)),
+        ("at random", part(16, 2, Order::Table(crate::order::shuffled(256, 3)), 100, 0.02)),
         ("in noise", part(16, 1, Order::ZigZag, 200, 6.0)),
     ]
 }

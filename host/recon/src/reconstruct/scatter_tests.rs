@@ -45,8 +45,7 @@ struct Tally {
 
 #[test]
 fn where_nearly_all_light_is_scattered_no_method_loses_against_zero_filling() {
-    // The most correlation that a method may lose; the eye does not see such a loss. As measured, `tv` loses 0.00003 in 1
-    // of 72 cases, and the other methods lose nothing.
+    // The most correlation that a method may lose; the eye does not see such a loss.
     const MOST_LOST: f64 = 1e-4;
     let mut random = Pcg64::seed_from_u64(5);
     let mut tallies = METHODS.map(|_| Tally { lost: 0, worst: 0.0, sum: 0.0 });
@@ -63,16 +62,16 @@ fn where_nearly_all_light_is_scattered_no_method_loses_against_zero_filling() {
                 for share in [0.1, 0.3] {
                     let part = noisy.take(Some(&Order::ZigZag), share).unwrap();
                     let images = METHODS.map(|method| image_by(method, &part));
-                    for full in [hadamard(&all), hadamard(&noisy)] {
-                        let zero = correlation_of(&hadamard(&part), &full);
-                        for (image, tally) in images.iter().zip(&mut tallies) {
-                            let gain = correlation_of(image, &full) - zero;
-                            tally.lost += usize::from(gain < -1e-5);
-                            tally.worst = tally.worst.min(gain);
-                            tally.sum += gain;
-                        }
-                        cases += 1;
+                    // Without noise: an image with the noise of the readings favours zero filling.
+                    let full = hadamard(&all);
+                    let zero = correlation_of(&hadamard(&part), &full);
+                    for (image, tally) in images.iter().zip(&mut tallies) {
+                        let gain = correlation_of(image, &full) - zero;
+                        tally.lost += usize::from(gain < -1e-5);
+                        tally.worst = tally.worst.min(gain);
+                        tally.sum += gain;
                     }
+                    cases += 1;
                 }
             }
         }

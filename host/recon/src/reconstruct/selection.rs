@@ -10,12 +10,26 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-/// The result of cross-validation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The number of atoms that a pursuit stops at, and what is known of their prediction.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Choice {
     pub atoms: usize,
     /// Trust: factor on the prediction for rows that were not measured.
     pub trust: f32,
+    /// What was predicted for each measurement without it, if measurements were held back.
+    pub held_back: Option<Vec<f32>>,
+}
+
+/// The prediction that cross-validation chose.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Chosen {
+    /// Index of the candidate.
+    pub at: usize,
+    /// Trust: factor on the prediction for rows that were not measured.
+    pub trust: f32,
+    /// What the candidate predicts for each measurement without it. The all-ones row, which is never
+    /// held back, has its measurement.
+    pub held_back: Vec<f32>,
 }
 
 /// Values of trust to try. The grid is coarse because the error is flat around its minimum.
@@ -27,20 +41,30 @@ const SPLIT_SEED: u64 = 0x5eed;
 
 /// Difference between a prediction and the held-back measurements.
 #[derive(Debug, Clone, Copy, Default)]
-struct Miss {
+pub(super) struct Miss {
     absolute: f64,
     squared: f64,
 }
 
 impl Miss {
-    fn add(&mut self, other: Self) {
+    /// One error.
+    pub fn of(error: f64) -> Self {
+        Self { absolute: error.abs(), squared: error * error }
+    }
+
+    /// Sum of the squared errors.
+    pub fn squared(self) -> f64 {
+        self.squared
+    }
+
+    pub fn add(&mut self, other: Self) {
         self.absolute += other.absolute;
         self.squared += other.squared;
     }
 
     /// The miss relative to zero filling's. Absolute and squared error count alike: 2 is as bad as
     /// zero filling.
-    fn relative_to(self, zero: Self) -> f64 {
+    pub fn relative_to(self, zero: Self) -> f64 {
         self.absolute / zero.absolute + self.squared / zero.squared
     }
 }
@@ -148,8 +172,10 @@ pub(super) fn choose_sparsity(
     let found =
         choose_among(problem, sparsities.len(), folds, trusted, |kept| predict(kept, &sparsities))?;
     Ok(match found {
-        None => Choice { atoms: largest, trust: 0.0 },
-        Some((at, trust)) => Choice { atoms: sparsities[at], trust },
+        None => Choice { atoms: largest, trust: 0.0, held_back: None },
+        Some(Chosen { at, trust, held_back }) => {
+            Choice { atoms: sparsities[at], trust, held_back: Some(held_back) }
+        }
     })
 }
 
@@ -162,25 +188,29 @@ pub(super) fn choose_among(
     folds: usize,
     trusted: Trusted,
     predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
-) -> Result<Option<(usize, f32)>, OmpError> {
-    let fold_of = split(problem, folds);
-    let parts: Vec<(Vec<usize>, Vec<usize>)> = (0..folds)
-        .map(|fold| (0..problem.rows.len()).partition(|&k| fold_of[k] != Some(fold)))
-        .filter(|(kept, held): &(Vec<_>, Vec<_>)| !kept.is_empty() && !held.is_empty())
-        .collect();
+) -> Result<Option<Chosen>, OmpError> {
+    let parts = parts(problem.rows, folds);
     if parts.is_empty() {
         return Ok(None);
     }
     let fine = finer_half(problem.rows);
-    let results: Result<Vec<Misses>, OmpError> = parts
+    let results: Result<Vec<(Misses, Vec<Vec<f32>>)>, OmpError> = parts
         .par_iter()
-        .map(|(kept, held)| Ok(misses_of(problem, &predict(kept)?, held, &fine)))
+        .map(|(kept, held)| {
+            let predictions = predict(kept)?;
+            let misses = misses_of(problem, &predictions, held, &fine);
+            let of_held = |predicted: &Vec<f32>| {
+                held.iter().map(|&k| predicted[problem.rows[k] as usize]).collect()
+            };
+            Ok((misses, predictions.iter().map(of_held).collect()))
+        })
         .collect();
+    let results = results?;
     let mut total: Misses = vec![Default::default(); count];
-    for misses in results? {
+    for (misses, _) in &results {
         for ((total, total_fine), (misses, fine)) in total.iter_mut().zip(misses) {
-            total.iter_mut().zip(misses).for_each(|(total, miss)| total.add(miss));
-            total_fine.join(fine);
+            total.iter_mut().zip(misses).for_each(|(total, miss)| total.add(*miss));
+            total_fine.join(*fine);
         }
     }
     let zero_filling = total[0].0[0];
@@ -198,7 +228,13 @@ pub(super) fn choose_among(
         Trusted::ByAll => 1.0,
         Trusted::AsFarAsFine { standard_errors } => total[at].1.most_trust(standard_errors) as f32,
     };
-    Ok(Some((at, trust.min(limit))))
+    let mut held_back = problem.values.clone();
+    for ((_, held), (_, predictions)) in parts.iter().zip(&results) {
+        for (&k, &predicted) in held.iter().zip(&predictions[at]) {
+            held_back[k] = predicted;
+        }
+    }
+    Ok(Some(Chosen { at, trust: trust.min(limit), held_back }))
 }
 
 /// The miss of each prediction with each trust, on the held-back measurements.
@@ -223,7 +259,7 @@ fn misses_of(
             for &k in held {
                 let row = problem.rows[k] as usize;
                 let error = f64::from(problem.values[k] - trust * predicted[row]);
-                miss.add(Miss { absolute: error.abs(), squared: error * error });
+                miss.add(Miss::of(error));
             }
             miss
         })
@@ -242,13 +278,22 @@ fn finer_half(rows: &Rows) -> Vec<bool> {
     fine
 }
 
+/// Positions that are kept and positions that are held back, for each fold that holds back any.
+pub(super) fn parts(rows: &Rows, folds: usize) -> Vec<(Vec<usize>, Vec<usize>)> {
+    let fold_of = split(rows, folds);
+    (0..folds)
+        .map(|fold| (0..rows.len()).partition(|&k| fold_of[k] != Some(fold)))
+        .filter(|(kept, held): &(Vec<_>, Vec<_>)| !kept.is_empty() && !held.is_empty())
+        .collect()
+}
+
 /// The fold that holds each measurement back; `None` for the all-ones row (the mean), which no
 /// other row predicts. Neighbours in sequency go to different folds, so each fold lacks rows of
 /// every scale.
-fn split(problem: &Problem, folds: usize) -> Vec<Option<usize>> {
+fn split(rows: &Rows, folds: usize) -> Vec<Option<usize>> {
     let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
-    let mut fold_of = vec![None; problem.rows.len()];
-    let by_sequency = order::positions_by_sequency(problem.rows);
+    let mut fold_of = vec![None; rows.len()];
+    let by_sequency = order::positions_by_sequency(rows);
     for group in by_sequency.chunks(folds) {
         let mut free: Vec<usize> = (0..folds).collect();
         for &k in group {

@@ -62,7 +62,7 @@ fn add_scene(
     done: &mut Vec<VideoFrame>,
 ) -> Result<(), ReconstructError> {
     let mut problem = Problem::new(first, settings);
-    let choice = choose_atoms(&problem, settings)?;
+    let mut choice = choose_atoms(&problem, settings)?;
     let (transform, prior) = (problem.transform.clone(), problem.prior.clone());
     let dictionary = crate::omp::sampled::SampledHadamard::new(&transform, problem.rows, &prior);
     let limits = Limits { sparsity: choice.atoms, ..problem.limits() };
@@ -77,10 +77,13 @@ fn add_scene(
         let path = solver.solve_from(&problem.values, &start)?;
         let found = Found::first(choice.atoms, &path);
         let predicted = dictionary.predict(&found.support, &found.coefficients);
-        let made = reconstruction(&problem, found, predicted, settings.completion, choice.trust);
-        if made.residual > WORSE * *first_residual.get_or_insert(made.residual) {
+        let left = problem.residual_of(&predicted);
+        let made = reconstruction(&problem, found, predicted, settings, &choice);
+        if left > WORSE * *first_residual.get_or_insert(left) {
             break;
         }
+        // Later frames were not held back.
+        choice.held_back = None;
         start = path.support;
         start.truncate(start.len() * KEPT_OF_FOUR / 4);
         done.push(VideoFrame { reconstruction: made, warm: !std::ptr::eq(frame, first) });

@@ -190,6 +190,16 @@ impl FlatField {
         Some(dark.iter().filter(|&&value| value != 0.0).count())
     }
 
+    /// The image of a camera, corrected by the flat field that is kept for it, if there is one. Every
+    /// command that makes an image of a camera's frames calls this function.
+    #[must_use]
+    pub fn corrected(kept: Option<&Self>, image: Image) -> Image {
+        match kept {
+            Some(flat) => flat.correct(&image),
+            None => image,
+        }
+    }
+
     /// Corrects an image, as if all LEDs were equal. An image of another size does not come from
     /// this array and stays unchanged.
     #[must_use]

@@ -1,6 +1,7 @@
 use super::super::image::encode_grey;
 use super::super::testing::{Zip, npy, npy_f64, npy_i32, zip};
 use super::*;
+use crate::provenance::tests::provenance;
 
 fn members() -> Vec<(&'static str, Vec<u8>)> {
     let mut x = vec![0.0; 3 * AREA_PX];
@@ -65,7 +66,7 @@ fn page() -> Vec<u8> {
     let (width, height) = (120, 90);
     let bar = |at: usize| (30..50).contains(&(at % width)) && (10..50).contains(&(at / width));
     let values: Vec<f32> = (0..width * height).map(|at| if bar(at) { 0.0 } else { 1.0 }).collect();
-    encode_grey(width, height, &values)
+    encode_grey(width, height, &values, &provenance())
 }
 
 #[test]
@@ -103,7 +104,8 @@ fn folders_and_pages_that_hold_nothing_are_named() {
     assert!(text.contains("a folder without either"), "{text}");
     let sample = folder.path().join("Fnt/Sample001");
     std::fs::create_dir_all(&sample).unwrap();
-    std::fs::write(sample.join("img001-00001.png"), encode_grey(8, 8, &[1.0; 64])).unwrap();
+    std::fs::write(sample.join("img001-00001.png"), encode_grey(8, 8, &[1.0; 64], &provenance()))
+        .unwrap();
     let text = read(folder.path()).unwrap_err().to_string();
     assert!(text.contains("img001-00001.png: found an empty page"), "{text}");
     std::fs::rename(sample.join("img001-00001.png"), sample.join("a.png")).unwrap();

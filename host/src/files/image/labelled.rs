@@ -6,6 +6,8 @@
 //! # Invariant
 //! Labels are never read as an image (`super::tests::labels_are_never_read_as_an_image`).
 
+use super::sign;
+use crate::provenance::Provenance;
 use ::image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Seek};
@@ -41,12 +43,18 @@ pub(super) struct Labels {
     image: Option<Placed>,
 }
 
-/// The bytes of a colour PNG that shows so many images, with the place of a single one.
+/// The bytes of a colour PNG that shows so many images, with the place of a single one and their
+/// provenance.
 ///
 /// # Panics
 /// If the picture has no pixel.
 #[must_use]
-pub(crate) fn encode_labelled(picture: &RgbImage, images: usize, image: Option<Placed>) -> Vec<u8> {
+pub(crate) fn encode_labelled(
+    picture: &RgbImage,
+    images: usize,
+    image: Option<Placed>,
+    provenance: &Provenance,
+) -> Vec<u8> {
     let labels = Labels { size: [picture.width(), picture.height()], images, image };
     let text = serde_json::to_string(&labels).expect("numbers are JSON");
     let mut bytes = Vec::new();
@@ -55,6 +63,7 @@ pub(crate) fn encode_labelled(picture: &RgbImage, images: usize, image: Option<P
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.add_text_chunk(KEY.to_owned(), text)?;
+        sign(&mut encoder, provenance)?;
         let mut writer = encoder.write_header()?;
         writer.write_image_data(picture.as_raw())?;
         writer.finish()

@@ -1,5 +1,6 @@
 use super::super::testing::{file, line};
 use super::*;
+use crate::provenance::tests::provenance;
 use ::image::{GrayImage, ImageBuffer, Luma, LumaA, Rgb, Rgba};
 
 fn png(picture: impl Into<DynamicImage>) -> Vec<u8> {
@@ -16,13 +17,13 @@ fn read(bytes: &[u8]) -> Result<Reflectance, FileError> {
 #[test]
 fn all_256_grey_levels_survive_a_round_trip() {
     let values: Vec<f32> = (0..256).map(|level| level as f32 / 255.0).collect();
-    let bytes = encode_grey(16, 16, &values);
+    let bytes = encode_grey(16, 16, &values, &provenance());
     let map = read(&bytes).unwrap();
     assert_eq!(map.size_px, 16);
     for (found, wanted) in map.values.iter().zip(&values) {
         assert!((found - wanted).abs() < 1e-6, "{found} {wanted}");
     }
-    assert_eq!(encode_grey(16, 16, &map.values), bytes);
+    assert_eq!(encode_grey(16, 16, &map.values, &provenance()), bytes);
 }
 
 #[test]
@@ -173,7 +174,7 @@ fn a_picture_with_labels_is_read_as_the_image_in_it() {
     let values: Vec<f32> = (0..1024).map(|p| p as f32 / 1023.0).collect();
     let written = |range, unit| {
         let panel = Panel { range, ..Panel::square("image", 32, &values, unit) };
-        read(&SideBySide::from(panel).png()).unwrap()
+        read(&SideBySide::from(panel).png(&provenance())).unwrap()
     };
     let found = written(Range::Unit, Unit::OfWhite);
     assert_eq!(found.size_px, 32);
@@ -194,10 +195,10 @@ fn labels_are_never_read_as_an_image() {
     let one = || Panel::square("image", 32, &values, Unit::OfWhite);
     let (header, footer) = (String::new(), String::new());
     let two = SideBySide { header, panels: vec![one(), one()], footer };
-    let told = line(&read(&two.png()).unwrap_err(), "scene.png");
+    let told = line(&read(&two.png(&provenance())).unwrap_err(), "scene.png");
     assert!(told.contains("a picture of 2 images with labels, expected one image"), "{told}");
     let sheet = Sheet::new(String::new(), 32, vec![&values; 3], Unit::OfWhite);
-    let told = line(&read(&sheet.png()).unwrap_err(), "scene.png");
+    let told = line(&read(&sheet.png(&provenance())).unwrap_err(), "scene.png");
     assert!(told.contains("a picture of 3 images"), "{told}");
     // Another program has resized the picture and kept its text.
     let placed = Placed { left: 0, top: 0, cell: 1, width: 2, height: 2, black: 0.0, white: 1.0 };
@@ -208,11 +209,13 @@ fn labels_are_never_read_as_an_image() {
         Placed { cell: u32::MAX, ..placed },
         Placed { width: 0, ..placed },
     ] {
-        let told =
-            line(&read(&encode_labelled(&picture, 1, Some(damaged))).unwrap_err(), "scene.png");
+        let told = line(
+            &read(&encode_labelled(&picture, 1, Some(damaged), &provenance())).unwrap_err(),
+            "scene.png",
+        );
         assert!(told.contains("damaged labels"), "{told}");
     }
-    let bytes = encode_labelled(&picture, 1, Some(placed));
+    let bytes = encode_labelled(&picture, 1, Some(placed), &provenance());
     assert_eq!(read(&bytes).unwrap().size_px, 2);
     let mut resized = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut resized, 1, 1);
@@ -228,7 +231,7 @@ fn labels_are_never_read_as_an_image() {
 fn a_damaged_signature_is_no_other_kind_of_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
-    let mut bytes = encode_grey(2, 2, &[0.5; 4]);
+    let mut bytes = encode_grey(2, 2, &[0.5; 4], &provenance());
     bytes[6] ^= 1;
     std::fs::write(&path, bytes).unwrap();
     let error = read_grey(&path).unwrap_err().to_string();

@@ -5,6 +5,7 @@ use super::reference::read_reference;
 use super::rows::{read_rows, read_side, shown};
 use super::{FileError, Form, MeasurementFile, Readings, Reference, Selection};
 use crate::files::fields::{Field, Fields};
+use nirspi_recon::law::{Claim, OVERLOAD};
 use nirspi_recon::{Image, Rows, Side};
 use std::path::Path;
 
@@ -17,6 +18,7 @@ pub(super) struct Opened {
     /// All rows, if each was read: the measurements share them.
     pub(super) every_row: Option<Rows>,
     pub(super) form: Form,
+    side_guessed: bool,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
     pub(super) simulated: Option<bool>,
@@ -52,6 +54,7 @@ impl Opened {
         let default = if name == "d" { Form::Differences } else { Form::Pairs };
         let form = want.form.unwrap_or(default);
         let mut notes = Vec::new();
+        let side_guessed = side.is_none();
         let (side, mut rows, readings) = match &want.shown {
             None => {
                 let Some(side) = side else {
@@ -88,7 +91,18 @@ impl Opened {
         // A list that is not sound is refused with the first measurement.
         let every_row: Option<Vec<u32>> = rows.iter().copied().collect();
         let every_row = every_row.and_then(|rows| Rows::new(side, rows).ok());
-        Ok(Self { fields, side, rows, every_row, form, readings, reference, simulated, notes })
+        Ok(Self {
+            fields,
+            side,
+            rows,
+            every_row,
+            form,
+            side_guessed,
+            readings,
+            reference,
+            simulated,
+            notes,
+        })
     }
 
     /// Number of patterns, those that were not read included.
@@ -104,7 +118,7 @@ impl Opened {
 
     /// A measurement without any pattern that was read.
     pub(super) fn no_pattern(&self) -> FileError {
-        let found = "has no pattern that was read: all are NaN";
+        let found = "has no pattern that was read: all are NaN or too large";
         FileError::field(self.fields.path(), self.readings.name.clone(), found, "finite readings")
     }
 
@@ -142,13 +156,15 @@ impl Loaded<'_> {
             std::iter::once(first).chain(second)
         };
         let is_read = |k: usize| {
-            let finite = |values: &[f64]| at(k).all(|reading| values[reading].is_finite());
+            let finite = |values: &[f64]| at(k).all(|reading| is_reading(values[reading]));
             opened.rows[k].is_some() && finite(&real) && imaginary.as_deref().is_none_or(finite)
         };
         let (places, not_read): (Vec<usize>, Vec<usize>) = (0..count).partition(|&k| is_read(k));
         if places.is_empty() {
             return Err(opened.no_pattern());
         }
+        let overloaded = |k: &usize| real[*k].abs() >= OVERLOAD;
+        let overloads = (0..real.len()).filter(overloaded).collect();
         let as_they_are = not_read.is_empty() && opened.form != Form::Halves;
         let kept = |values: Vec<f64>| -> Readings {
             let values = match as_they_are {
@@ -176,11 +192,19 @@ impl Loaded<'_> {
             imaginary: imaginary.map(kept),
             places,
             not_read,
+            overloads,
+            claim: Claim { form: opened.form, side_guessed: opened.side_guessed },
+            patterns: count,
             reference: opened.reference(index),
             simulated: opened.simulated,
             notes: opened.notes.clone(),
         })
     }
+}
+
+/// Whether a number is a reading, and not a sign that there is none.
+pub(super) fn is_reading(value: f64) -> bool {
+    value.abs() < OVERLOAD
 }
 
 /// Whether the file says that no real light was measured. A field of another kind says nothing.

@@ -1,5 +1,6 @@
 //! Readings of patterns that the file does not name, for `--matrix`.
 
+use super::opened::is_reading;
 use super::readings::{Expected, Hint, NamedReadings, check_infinite, readings_field};
 use super::{FileError, Selection};
 use crate::files::fields::Fields;
@@ -12,7 +13,7 @@ pub struct Plain {
     pub values: Vec<f64>,
     /// The pattern of each reading.
     pub patterns: Vec<usize>,
-    /// Patterns that were not read: the file has NaN.
+    /// Patterns that were not read: the file has NaN, or an instrument's word for overload.
     pub not_read: Vec<usize>,
 }
 
@@ -40,7 +41,7 @@ pub fn read_plain(path: &Path, want: &Selection, patterns: usize) -> Result<Plai
     let all = layout.series(&numbers.real, index);
     check_infinite(path, &readings.name, &all)?;
     let (patterns, not_read): (Vec<usize>, Vec<usize>) =
-        (0..all.len()).partition(|&k| all[k].is_finite());
+        (0..all.len()).partition(|&k| is_reading(all[k]));
     if patterns.is_empty() {
         return Err(FileError::field(
             path,

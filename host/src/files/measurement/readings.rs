@@ -1,5 +1,6 @@
 //! Finds the field of a file that holds the readings, and checks the field's shape.
 
+use super::form::meaning;
 use super::layout::Layout;
 use super::{FileError, Form, Selection};
 use crate::files::array::has_shape;
@@ -152,7 +153,7 @@ pub(super) fn expected_of(form: Form, rows: usize) -> Expected<'static> {
             Hint { length: 2 * rows, words: "; +, - pairs are read with --readings pairs" }
         }
     };
-    Expected { length: rows * form.readings(), meaning: form.meaning(), hint }
+    Expected { length: rows * form.readings(), meaning: meaning(form), hint }
 }
 
 /// Refuses infinite readings. NaN marks a pattern that was not read; an infinite reading is a

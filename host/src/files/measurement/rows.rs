@@ -1,6 +1,7 @@
 //! The side of the image and the row shown k-th, from the file or from the order that the user
 //! names.
 
+use super::form::meaning;
 use super::layout::Layout;
 use super::readings::NamedReadings;
 use super::{FileError, Form, Selection};
@@ -30,7 +31,7 @@ pub(super) fn shown(
     let along = if want.patterns_first { axes.next() } else { axes.next_back() };
     let length = along.unwrap_or(1) as usize;
     if !length.is_multiple_of(each) {
-        let expected = format!("an even number: {}", form.meaning());
+        let expected = format!("an even number: {}", meaning(form));
         return Err(refuse(format!("has {length} readings a measurement"), expected));
     }
     let count = length / each;
@@ -47,7 +48,7 @@ pub(super) fn shown(
                     _ => "",
                 };
                 refuse(
-                    format!("has {length} readings, of {count} patterns ({})", form.meaning()),
+                    format!("has {length} readings, of {count} patterns ({})", meaning(form)),
                     format!("those of a full sweep of n * n patterns, n a power of two, or --side N{hint}"),
                 )
             })?
@@ -55,7 +56,7 @@ pub(super) fn shown(
     };
     let (n, area) = (side.pixels(), side.area());
     if count > area {
-        let found = format!("has {length} readings, of {count} patterns ({})", form.meaning());
+        let found = format!("has {length} readings, of {count} patterns ({})", meaning(form));
         return Err(refuse(found, format!("at most {area} patterns for n = {n}")));
     }
     let rows = order.rows(side).map_err(|error| {

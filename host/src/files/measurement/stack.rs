@@ -8,6 +8,7 @@ use super::opened::Opened;
 use super::readings::check_infinite;
 use super::{FileError, Form};
 use crate::files::stored::Stored;
+use nirspi_recon::law::keeps_the_law;
 use nirspi_recon::{Rows, Side};
 use rayon::prelude::*;
 
@@ -86,8 +87,10 @@ impl<'o> Stack<'o> {
     }
 
     /// Reads the differences, those of one measurement after another. NaN: the pattern was not read
-    /// in this measurement. Says whether each pattern was read in at least one measurement; a
-    /// pattern that was read in none does not belong to the measurements.
+    /// in this measurement. Says whether the block is the measurements: each pattern was read in at
+    /// least one of them, since a pattern that was read in none does not belong to them, and each of
+    /// them surely [keeps the law of readings](keeps_the_law). If not, the measurements are read one by
+    /// one.
     ///
     /// # Errors
     /// As [`read`](super::read).
@@ -108,8 +111,9 @@ impl<'o> Stack<'o> {
                 parts.map(copy).reduce(|| true, |a, b| a & b)
             }
         };
+        let sound = |one: &[f64]| keeps_the_law(&self.rows, one);
         if finite {
-            return Ok(true);
+            return Ok(out.par_chunks(patterns).all(sound));
         }
         let mut read = vec![false; patterns];
         for one in out.chunks_exact(patterns) {
@@ -119,12 +123,13 @@ impl<'o> Stack<'o> {
             }
             read.iter_mut().zip(one).for_each(|(read, value)| *read |= !value.is_nan());
         }
-        Ok(read.into_iter().all(|read| read))
+        Ok(read.into_iter().all(|read| read) && out.par_chunks(patterns).all(sound))
     }
 
     /// Makes something of each measurement, on all threads: `make` gets the differences of a measurement and the places
     /// of `out` that belong to this measurement. Numbers that the file stores without compression are read piece by piece, so
-    /// that the memory never holds them all. `None` if a difference is not finite, or `make` gives nothing.
+    /// that the memory never holds them all. `None` if a difference is not finite, if a measurement may break the
+    /// [law of readings](keeps_the_law), or if `make` gives nothing.
     ///
     /// # Errors
     /// As [`read`](super::read).
@@ -138,6 +143,10 @@ impl<'o> Stack<'o> {
     ) -> Result<Option<Vec<R>>, FileError> {
         let (count, patterns) = (self.count(), self.rows.len());
         assert!(out.len().is_multiple_of(count), "places for the measurements");
+        let make = |values: &[f64], places: &mut [T]| match keeps_the_law(&self.rows, values) {
+            true => make(values, places),
+            false => None,
+        };
         match &self.numbers {
             Numbers::File(stored) => stored.map_groups(patterns, out, make),
             Numbers::Memory(numbers) => {

@@ -230,7 +230,7 @@ fn each_bad_field_gets_a_line_that_names_it() {
         (
             "y.npy",
             npy_f64("(6,)", &[f64::NAN; 6]),
-            "`y` has no pattern that was read: all are NaN, expected finite readings",
+            "`y` has no pattern that was read: all are NaN or too large, expected finite readings",
         ),
         (
             "y.npy",

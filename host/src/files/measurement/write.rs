@@ -2,28 +2,32 @@
 
 use super::FileError;
 use crate::files::{archive, npy};
+use crate::provenance::Provenance;
 use nirspi_recon::Measurements;
 use std::path::Path;
 
-/// The bytes of a `.npz` file with `n`, `h_row` and `d`. `simulated` is 1 if no real light was
-/// measured.
+/// The field of an `.npz` file with its provenance, as JSON text.
+pub const PROVENANCE: &str = "provenance";
+
+/// The bytes of a `.npz` file with `n`, `h_row` and `d`, and the provenance as JSON text. `simulated`
+/// is 1 if no real light was measured, and is left out if that is not known.
 ///
 /// # Errors
 /// [`FileError`] naming `path`, if the archive cannot be written.
 pub fn encode(
     path: &Path,
     measurements: &Measurements,
-    simulated: bool,
+    provenance: &Provenance,
 ) -> Result<Vec<u8>, FileError> {
     let rows: Vec<i64> = measurements.rows().iter().map(|&row| row.into()).collect();
     let count = [rows.len()];
-    archive::encode(
-        path,
-        &[
-            ("n", npy::encode(&[], &[measurements.side().pixels() as i64])),
-            ("h_row", npy::encode(&count, &rows)),
-            ("d", npy::encode(&count, measurements.values())),
-            ("simulated", npy::encode(&[], &[i64::from(simulated)])),
-        ],
-    )
+    let mut members = vec![
+        ("n", npy::encode(&[], &[measurements.side().pixels() as i64])),
+        ("h_row", npy::encode(&count, &rows)),
+        ("d", npy::encode(&count, measurements.values())),
+        (PROVENANCE, npy::encode_text(&provenance.json())),
+    ];
+    let simulated = provenance.taken.simulated();
+    members.extend(simulated.map(|s| ("simulated", npy::encode(&[], &[i64::from(s)]))));
+    archive::encode(path, &members)
 }

@@ -188,7 +188,7 @@ fn written_again(file: &MeasurementFile) {
     let Readings::Differential(values) = &file.readings else { return };
     let Ok(measurements) = Measurements::from_differential(&file.h_row, values) else { return };
     let path = place::path("again.npz");
-    let bytes = measurement::encode(&path, &measurements, true).expect("an archive");
+    let bytes = measurement::encode(&path, &measurements, &provenance()).expect("an archive");
     std::fs::write(&path, bytes).expect("its file");
     let again = measurement::read(&path, &Selection::default()).expect("our own file");
     assert_eq!((&again.h_row, &again.readings), (&file.h_row, &file.readings));
@@ -238,7 +238,7 @@ fn sound() -> Vec<u8> {
     let side = Side::new(2).expect("a side");
     let rows = Rows::new(side, (0..4_u32).collect::<Vec<_>>()).expect("rows");
     let made = Measurements::from_differential(&rows, &[4.0, 1.0, -2.0, 0.5]).expect("numbers");
-    measurement::encode(Path::new("m.npz"), &made, true).expect("an archive")
+    measurement::encode(Path::new("m.npz"), &made, &provenance()).expect("an archive")
 }
 
 fn file_seeds() -> Vec<Vec<u8>> {
@@ -363,4 +363,10 @@ fn table_seeds() -> Vec<Vec<u8>> {
         b"1\n2\n3\n4\n5\n6\n7\n8\n9\n10\n11\n12\n13\n14\n15\n16\n",
     ];
     texts.map(<[u8]>::to_vec).to_vec()
+}
+
+/// A provenance for files of tests.
+fn provenance() -> nirspi::provenance::Provenance {
+    use nirspi::provenance::{Made, Origin, Taken};
+    Taken::without_camera(Origin::Simulated).made(&Made::by("test", None, ["test"], 0))
 }

@@ -70,7 +70,7 @@ fn picture(bytes: &[u8]) {
     assert!(
         small.values.len() == 9 && small.values.iter().all(|value| (0.0..=1.0).contains(value))
     );
-    let again = place::file("again.png", &encode_grey(width, height, &grey.values));
+    let again = place::file("again.png", &encode_grey(width, height, &grey.values, &provenance()));
     let back = read_grey(&again).expect("our own file");
     assert_eq!((back.width, back.height), (grey.width, grey.height));
     for (a, b) in grey.values.iter().zip(&back.values) {
@@ -91,7 +91,7 @@ fn png_seeds() -> Vec<Vec<u8>> {
     let deep = DynamicImage::from(grey.clone()).into_luma16();
     let all: [DynamicImage; 4] = [grey.into(), colours.into(), clear.into(), deep.into()];
     let mut all: Vec<Vec<u8>> = all.iter().map(|one| encoded(one, ImageFormat::Png)).collect();
-    all.push(encode_grey(8, 8, &[0.25; 64]));
+    all.push(encode_grey(8, 8, &[0.25; 64], &provenance()));
     all
 }
 
@@ -105,4 +105,10 @@ fn jpeg_seeds() -> Vec<Vec<u8>> {
     let turned = [&rough[..2], exif, &rough[2..]].concat();
     let colours = encoded(&colours.into(), ImageFormat::Jpeg);
     vec![rough, turned, colours]
+}
+
+/// A provenance for files of tests.
+fn provenance() -> nirspi::provenance::Provenance {
+    use nirspi::provenance::{Made, Origin, Taken};
+    Taken::without_camera(Origin::Simulated).made(&Made::by("test", None, ["test"], 0))
 }

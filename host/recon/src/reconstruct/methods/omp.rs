@@ -47,7 +47,6 @@ impl Omp {
             backend: if device.is_some() { asked.backend } else { Backend::Cpu },
             sparsity: asked.sparsity,
             residual: asked.residual,
-            completion: asked.completion(),
             non_negative: asked.non_negative,
             ..base
         };
@@ -55,7 +54,7 @@ impl Omp {
     }
 
     fn reported(&self, found: OmpReconstruction) -> Reconstruction {
-        let OmpSettings { basis, backend, completion, sparsity, .. } = self.settings;
+        let OmpSettings { basis, backend, sparsity, .. } = self.settings;
         let mut report = Report::new(NAME);
         report.basis = Some(match &self.atoms {
             None => basis.to_string(),
@@ -64,7 +63,8 @@ impl Omp {
         report.backend = Some(backend);
         report.device = self.device.clone();
         report.sparsity = Some(found.sparsity);
-        report.completion = Some(completion);
+        report.reading_weight = Some(found.reading_weight);
+        report.held_back = found.held_back;
         report.stop = Some(sparsity.reason(found.stop));
         report.residual = Some(found.residual);
         report.unseen_atoms = Some(found.unseen_atoms);

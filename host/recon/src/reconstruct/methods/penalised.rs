@@ -20,7 +20,6 @@ pub(super) fn prepare(
     let settings = RegularisedSettings {
         basis: settings.basis,
         strength: settings.strength,
-        completion: settings.completion(),
         ..RegularisedSettings::new(penalty)
     };
     Ok(Box::new(Penalised { name, settings }))
@@ -32,12 +31,13 @@ impl Reconstruct for Penalised {
     }
 
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
-        let RegularisedSettings { penalty, basis, completion, .. } = self.settings;
+        let RegularisedSettings { penalty, basis, .. } = self.settings;
         let found = regularised(measurements, &self.settings)?;
         let mut report = Report::new(self.name);
         report.basis = penalty.has_basis().then(|| basis.to_string());
         report.strength = Some(found.strength);
-        report.completion = Some(completion);
+        report.reading_weight = Some(found.reading_weight);
+        report.held_back = found.held_back;
         report.residual = Some(found.residual);
         report.trust = Some(found.trust);
         report.noise = Some(found.noise);

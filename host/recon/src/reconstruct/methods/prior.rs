@@ -4,8 +4,8 @@ use crate::Measurements;
 use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::prior::{SharedNetwork, with_network};
 use crate::reconstruct::{
-    Completion, Method, Reconstruct, ReconstructError, Reconstruction, Recursive,
-    RecursiveSettings, believed_frame,
+    Method, Reconstruct, ReconstructError, Reconstruction, Recursive, RecursiveSettings,
+    believed_frame,
 };
 
 const NAME: &str = "learned prior";
@@ -14,18 +14,19 @@ const NAME: &str = "learned prior";
 pub(in super::super) const METHOD: Method = Method(&Entry {
     argument: "prior",
     name: NAME,
-    about: "Completed by a small network, as far as held-back measurements support the network; measured values stay within their noise",
+    about: "Completed by a small network, as far as held-back measurements support the network; measured rows are weighted means of reading and network",
     takes: &[Setting::WarmStart],
     with_matrix: None,
     prepare: |settings| {
-        let (network, completion) = (settings.network.clone(), settings.completion);
-        Ok(Box::new(Prior { network, completion }))
+        let Some(network) = settings.network.clone() else {
+            return Err(ReconstructError::NeedsNetwork { method: Method::PRIOR });
+        };
+        Ok(Box::new(Prior { network }))
     },
 });
 
 struct Prior {
-    network: Option<SharedNetwork>,
-    completion: Option<Completion>,
+    network: SharedNetwork,
 }
 
 impl Reconstruct for Prior {
@@ -34,8 +35,7 @@ impl Reconstruct for Prior {
     }
 
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
-        let network = self.network.as_ref().map(SharedNetwork::get);
-        with_network(measurements, network, self.completion, NAME)
+        with_network(measurements, self.network.get(), NAME)
     }
 
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {

@@ -3,8 +3,8 @@
 use super::penalised;
 use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::{
-    Completion, MatrixMethod, Method, MethodSettings, Penalty, Reconstruct, ReconstructError,
-    Reconstruction, Recursive, RecursiveFrame, RecursiveSettings, Report,
+    MatrixMethod, Method, MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction,
+    Recursive, RecursiveFrame, RecursiveSettings, Report,
 };
 use crate::{Basis, Measurements};
 
@@ -28,11 +28,13 @@ struct Tikhonov {
 
 impl Tikhonov {
     fn new(settings: &MethodSettings) -> Result<Self, ReconstructError> {
-        let (strength, completion) = (settings.strength, settings.completion());
         Ok(Self {
             alone: penalised::prepare(NAME, Penalty::Tikhonov, settings)?,
             basis: settings.basis,
-            video: RecursiveSettings { strength, completion, ..RecursiveSettings::default() },
+            video: RecursiveSettings {
+                strength: settings.strength,
+                ..RecursiveSettings::default()
+            },
         })
     }
 }
@@ -62,16 +64,16 @@ impl Reconstruct for Tikhonov {
         frame: &Measurements,
     ) -> Result<Reconstruction, ReconstructError> {
         let made = past.add(frame)?;
-        let report = report(&made, self.video.completion);
+        let report = report(&made);
         Ok(Reconstruction { image: made.image, report })
     }
 }
 
-fn report(made: &RecursiveFrame, completion: Completion) -> Report {
+fn report(made: &RecursiveFrame) -> Report {
     let mut report = Report::new(NAME);
     report.basis = Some(Basis::Dct.to_string());
     report.strength = Some(made.strength);
-    report.completion = Some(completion);
+    report.reading_weight = Some(made.reading_weight);
     report.residual = Some(made.residual);
     report.noise = Some(made.noise);
     report.warm = made.warm;

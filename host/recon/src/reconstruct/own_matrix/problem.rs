@@ -1,13 +1,15 @@
 //! Some of the measurements in normalised units, with the expected sizes of the coefficients.
 //!
 //! # Invariant
-//! Let `u` be the measurements of an even image. The parts of `A` and `y` along `u` are removed.
-//! The mean has no penalty, so the removal changes no minimum
-//! (`super::tests::all_hadamard_rows_as_a_matrix_give_the_image_by_every_method`). The removal
-//! eliminates the by far largest singular value.
+//! The parts of `A` and `y` that are equal in all measurements are removed: they are those of the dark
+//! level, which has no penalty. Let `u` be the measurements of an even image. The parts along `u` are
+//! removed too, because the mean has no penalty. Neither removal changes a minimum
+//! (`super::tests::all_hadamard_rows_as_a_matrix_give_the_image_by_every_method`), and the second one
+//! eliminates the by far largest singular value. Mean and dark level are those that then fit the
+//! measurements best.
 
 use super::solvers::{self, Chosen};
-use super::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
+use super::{DarkLevel, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
 use crate::Side;
 use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
@@ -23,7 +25,10 @@ pub(super) struct Problem {
     atoms: Atoms,
     /// A pixel of 1 in the measurements' units.
     unit: f64,
-    mean: Option<Mean>,
+    raw: DMatrix<f64>,
+    raw_y: DVector<f64>,
+    mean: Mean,
+    fits_dark: bool,
 }
 
 /// The atoms of the coefficients.
@@ -33,31 +38,61 @@ enum Atoms {
     Own(DMatrix<f64>),
 }
 
-/// The values for finding the mean afterwards.
-struct Mean {
-    patterns: DMatrix<f64>,
-    y: DVector<f64>,
-    even: DVector<f64>,
+/// How the mean of the image is found afterwards.
+enum Mean {
+    /// The mean is part of the coefficients, or no pattern sees it.
+    Kept,
+    /// By least squares: the measurements of an even image of 1, without a dark level.
+    Fitted(DVector<f64>),
+    /// All patterns see the mean with this weight, so that the mean cannot be told from a dark level. The
+    /// dark level counts as 0.
+    Shared(f64),
 }
+
+/// An image and the dark level of its measurements.
+pub(super) struct Fit {
+    pub pixels: DVector<f64>,
+    pub dark: DarkLevel,
+}
+
+/// Rounding of sums, relative to the numbers.
+const ROUNDING: f64 = 1e-12;
 
 impl Problem {
     pub(super) fn new(own: &OwnMatrix, settings: &MatrixSettings, y: &[f64], at: &[usize]) -> Self {
         let raw = own.patterns.select_rows(at);
         let raw_y = DVector::from_iterator(at.len(), at.iter().map(|&k| y[k]));
         let area = own.side.area();
-        let even = raw.column_sum();
+        let (mut patterns, mut values) = (raw.clone(), raw_y.clone());
+        if settings.dark {
+            let means = raw.row_mean();
+            patterns.row_iter_mut().for_each(|mut row| row -= &means);
+            values.add_scalar_mut(-raw_y.mean());
+            // What rounding leaves of equal numbers is no contrast.
+            if patterns.norm() <= ROUNDING * raw.norm() {
+                patterns.fill(0.0);
+            }
+            if values.norm() <= ROUNDING * raw_y.norm() {
+                values.fill(0.0);
+            }
+        }
+        let even = patterns.column_sum();
         // The mean has no penalty only in a basis with the mean as an atom.
         let free = settings.atoms.is_none()
             && (settings.basis != Basis::Pixel
-                || settings.method == MatrixMethod::Penalty(Penalty::TotalVariation))
-            && even.norm() > 1e-9 * raw.norm();
-        let (mut patterns, mut values) = (raw.clone(), raw_y.clone());
-        let mean = free.then(|| {
-            let u = &even / even.norm();
-            patterns -= &u * (u.transpose() * &raw);
-            values -= &u * u.dot(&raw_y);
-            Mean { patterns: raw, y: raw_y, even }
-        });
+                || settings.method == MatrixMethod::Penalty(Penalty::TotalVariation));
+        let seen = |even: &DVector<f64>| even.norm() > 1e-9 * raw.norm();
+        let shared = raw.column_sum();
+        let mean = match free {
+            true if seen(&even) => {
+                let u = &even / even.norm();
+                patterns -= &u * (u.transpose() * &patterns);
+                values -= &u * u.dot(&values);
+                Mean::Fitted(even)
+            }
+            true if settings.dark && seen(&shared) => Mean::Shared(shared.mean()),
+            _ => Mean::Kept,
+        };
         let norm = solvers::norm(&patterns).max(f64::MIN_POSITIVE);
         patterns /= norm;
         let spread = (values.norm_squared() / values.len().max(1) as f64).sqrt();
@@ -74,11 +109,21 @@ impl Problem {
                 Atoms::Own(images)
             }
         };
-        Self { side: own.side, patterns, y: values, atoms, unit: spread / norm, mean }
+        Self {
+            side: own.side,
+            patterns,
+            y: values,
+            atoms,
+            unit: spread / norm,
+            raw,
+            raw_y,
+            mean,
+            fits_dark: settings.dark,
+        }
     }
 
     /// The image at each strength.
-    pub(super) fn penalised(&self, penalty: Penalty, strengths: &[f64]) -> Vec<DVector<f64>> {
+    pub(super) fn penalised(&self, penalty: Penalty, strengths: &[f64]) -> Vec<Fit> {
         let found = match penalty {
             Penalty::TotalVariation => {
                 let images =
@@ -87,7 +132,7 @@ impl Problem {
             }
             Penalty::Sparse => {
                 let (seen, scale) = self.expected();
-                let free = usize::from(self.mean.is_some());
+                let free = usize::from(matches!(self.mean, Mean::Fitted(_)));
                 solvers::sparse(&seen, &self.y, &scale, free, strengths)
             }
             Penalty::Tikhonov => {
@@ -105,7 +150,7 @@ impl Problem {
         noise: f64,
         sparsities: &[usize],
         non_negative: bool,
-    ) -> Result<Vec<(DVector<f64>, usize, Stop)>, MatrixError> {
+    ) -> Result<Vec<(Fit, usize, Stop)>, MatrixError> {
         let (seen, scale) = self.expected();
         let found = solvers::omp(&seen, &self.y, &scale, noise, sparsities, non_negative)?;
         Ok(found
@@ -155,13 +200,29 @@ impl Problem {
         }
     }
 
-    /// The image in the measurements' units, with the mean that fits the measurements best.
-    fn image(&self, pixels: DVector<f64>) -> DVector<f64> {
+    /// The image in the measurements' units, with the mean and the dark level that fit the measurements
+    /// best.
+    fn image(&self, pixels: DVector<f64>) -> Fit {
         let mut pixels = pixels * self.unit;
-        if let Some(Mean { patterns, y, even }) = &self.mean {
-            let left = y - patterns * &pixels;
-            pixels.add_scalar_mut(even.dot(&left) / even.norm_squared());
+        let left = &self.raw_y - &self.raw * &pixels;
+        let offset = left.mean();
+        match &self.mean {
+            Mean::Kept if self.fits_dark => Fit { pixels, dark: DarkLevel::Fitted(offset) },
+            Mean::Kept => Fit { pixels, dark: DarkLevel::LeftOut },
+            Mean::Shared(weight) => {
+                pixels.add_scalar_mut(offset / weight);
+                Fit { pixels, dark: DarkLevel::Unknown }
+            }
+            Mean::Fitted(even) => {
+                // Without a dark level in the fit, `even` is not centred, and neither is what is left.
+                let mean = even.dot(&left) / even.norm_squared();
+                pixels.add_scalar_mut(mean);
+                let dark = match self.fits_dark {
+                    true => DarkLevel::Fitted((&self.raw_y - &self.raw * &pixels).mean()),
+                    false => DarkLevel::LeftOut,
+                };
+                Fit { pixels, dark }
+            }
         }
-        pixels
     }
 }

@@ -57,6 +57,23 @@ pub(super) fn least_squares(a: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> 
     x
 }
 
+/// The factor by which `ghost` is subtracted from an image for the differences of neighbouring pixels to
+/// be least; `None` if the ghost is even.
+pub(super) fn smoothest(side: Side, image: &DVector<f64>, ghost: &DVector<f64>) -> Option<f64> {
+    let n = side.pixels();
+    let (mut shared, mut own) = (0.0, 0.0);
+    for p in 0..side.area() {
+        for neighbour in [(p % n + 1 < n).then_some(p + 1), (p + n < side.area()).then_some(p + n)]
+        {
+            let Some(q) = neighbour else { continue };
+            let step = ghost[q] - ghost[p];
+            shared += step * (image[q] - image[p]);
+            own += step * step;
+        }
+    }
+    (own > 1e-12 * ghost.norm_squared()).then_some(shared / own)
+}
+
 /// Coefficients by the dual problem, `(A S^2 A^T + t) z = y` and `c = S^2 A^T z`, which has as many
 /// unknowns as measurements.
 pub(super) fn tikhonov(

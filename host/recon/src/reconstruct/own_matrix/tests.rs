@@ -31,14 +31,15 @@ fn the_pseudo_inverse_is_that_of_the_singular_values() {
             assert_eq!(OwnMatrix::new(side, &other).unwrap().rank(), own.rank(), "{unit}");
         }
         let y: Vec<f64> = (0..rows).map(|_| normal(&mut random)).collect();
-        let found = own.reconstruct(&y, &MatrixSettings::new(MatrixMethod::PseudoInverse)).unwrap();
+        let settings =
+            MatrixSettings { dark: false, ..MatrixSettings::new(MatrixMethod::PseudoInverse) };
+        let found = own.reconstruct(&y, &settings).unwrap();
         let inverse = own.patterns.clone().pseudo_inverse(1e-9).unwrap();
         let exact = inverse * DVector::from_column_slice(&y);
         for (a, b) in found.image.pixels().iter().zip(exact.iter()) {
             assert!((f64::from(*a) - b).abs() < 1e-5 * exact.norm(), "{rows} rows: {a} and {b}");
         }
         let faint: Vec<f64> = y.iter().map(|y| y * 1e-12).collect();
-        let settings = MatrixSettings::new(MatrixMethod::PseudoInverse);
         let faint = own.reconstruct(&faint, &settings).unwrap();
         for (a, b) in faint.image.pixels().iter().zip(exact.iter()) {
             assert!((f64::from(*a) * 1e12 - b).abs() < 1e-5 * exact.norm(), "{rows} rows: {a}");
@@ -203,6 +204,122 @@ fn units_of_patterns_and_measurements_do_not_matter() {
         assert_eq!((found.strength, found.atoms), (other.strength, other.atoms));
         for (a, b) in found.image.pixels().iter().zip(other.image.pixels()) {
             assert!((f64::from(*a) - 1e9 * f64::from(*b)).abs() < 1e-3, "{method:?}: {a} {b}");
+        }
+    }
+}
+
+/// Patterns of this kind: 0/1, +-1, grey.
+fn patterns(kind: u8, count: usize, area: usize, seed: u64) -> Vec<f64> {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let weight = |v: f64| match kind {
+        0 => f64::from(u8::from(v < 0.5)),
+        1 => {
+            if v < 0.5 {
+                1.0
+            } else {
+                -1.0
+            }
+        }
+        _ => v,
+    };
+    (0..count * area).map(|_| weight(random.random::<f64>())).collect()
+}
+
+fn seen(weights: &[f64], image: &[f64], noise: f64) -> Vec<f64> {
+    let mut random = Pcg64::seed_from_u64(9);
+    let light = |p: &[f64]| p.iter().zip(image).map(|(w, v)| w * v).sum::<f64>();
+    weights.chunks_exact(image.len()).map(|p| light(p) + noise * normal(&mut random)).collect()
+}
+
+/// Dark levels up to ten times the signal, with few, with many and with all patterns.
+#[test]
+fn a_dark_level_changes_no_image() {
+    let side = side(8);
+    for kind in 0..3 {
+        for (count, scene_kind) in [(40, 2), (64, 1), (90, 2)] {
+            let image = scene(side, scene_kind);
+            let weights = patterns(kind, count, 64, 4 + u64::from(kind));
+            let own = OwnMatrix::new(side, &weights).unwrap();
+            let y = seen(&weights, &image, 0.01);
+            let signal = y.iter().map(|y| y.abs()).sum::<f64>() / y.len() as f64;
+            for method in METHODS {
+                let settings = MatrixSettings::new(method);
+                let clean = own.reconstruct(&y, &settings).unwrap();
+                for times in [0.1, 1.0, 10.0, -3.0] {
+                    let dark = times * signal;
+                    let lifted: Vec<f64> = y.iter().map(|y| y + dark).collect();
+                    let found = own.reconstruct(&lifted, &settings).unwrap();
+                    let alike = correlation_of(&found.image, &clean.image);
+                    let case = format!("kind {kind}, {count} patterns, {method:?}, dark {times}");
+                    assert!(alike > 0.999, "{case}: {alike}");
+                    let rise = found.dark.value() - clean.dark.value();
+                    assert!((rise / dark - 1.0).abs() < 0.01, "{case}: {rise} of {dark}");
+                }
+            }
+        }
+    }
+}
+
+/// The unknown constant costs next to nothing where there is no dark level, and the level is found where
+/// there is one.
+#[test]
+fn the_constant_costs_little_and_is_the_dark_level() {
+    let side = side(16);
+    let image = scene(side, 2);
+    for kind in 0..3 {
+        let weights = patterns(kind, 160, 256, 21);
+        let own = OwnMatrix::new(side, &weights).unwrap();
+        let y: Vec<f64> = seen(&weights, &image, 0.01).iter().map(|y| y + 30.0).collect();
+        let exact = Image::new(side, image.iter().map(|&v| v as f32).collect());
+        let settings = MatrixSettings::new(MatrixMethod::Penalty(Penalty::TotalVariation));
+        let found = own.reconstruct(&y, &settings).unwrap();
+        let alike = correlation_of(&found.image, &exact);
+        assert!(alike > 0.99, "kind {kind}: {alike}");
+        assert!((found.dark.value() - 30.0).abs() < 1.0, "kind {kind}: {:?}", found.dark);
+        let without = own.reconstruct(&y, &MatrixSettings { dark: false, ..settings }).unwrap();
+        let worse = correlation_of(&without.image, &exact);
+        assert!(worse < alike - 0.02, "kind {kind}: {worse} and {alike}");
+        assert_eq!(without.dark, DarkLevel::LeftOut);
+    }
+}
+
+#[test]
+fn a_mean_that_looks_like_a_dark_level_stays_in_the_image() {
+    let side = side(8);
+    let image = scene(side, 1);
+    let mean = image.iter().sum::<f64>() / 64.0;
+    let mean_of = |image: &Image| image.pixels().iter().sum::<f32>() as f64 / 64.0;
+    // Half of the pixels of each pattern are lit.
+    let mut random = Pcg64::seed_from_u64(2);
+    let mut half: Vec<f64> = (0..64).map(|p| f64::from(u8::from(p % 2 == 0))).collect();
+    let weights: Vec<f64> = (0..48)
+        .flat_map(|_| {
+            half.shuffle(&mut random);
+            half.clone()
+        })
+        .collect();
+    // Each pixel alone: a raster.
+    let raster: Vec<f64> = (0..64 * 64).map(|at| f64::from(u8::from(at % 65 == 0))).collect();
+    for (name, weights) in [("half", weights), ("raster", raster)] {
+        let own = OwnMatrix::new(side, &weights).unwrap();
+        let y = seen(&weights, &image, 0.0);
+        for method in METHODS {
+            let found = own.reconstruct(&y, &MatrixSettings::new(method)).unwrap();
+            assert!((mean_of(&found.image) / mean - 1.0).abs() < 0.02, "{name}, {method:?}");
+            assert_eq!(found.dark, DarkLevel::Unknown, "{name}, {method:?}");
+        }
+    }
+    // All rows of a Hadamard matrix, the even one among them.
+    let sign = |k: usize| f64::from(1 - 2 * (((k / 64) & (k % 64)).count_ones() as i32 % 2));
+    let weights: Vec<f64> = (0..64 * 64).map(sign).collect();
+    let own = OwnMatrix::new(side, &weights).unwrap();
+    for dark in [0.0, 20.0] {
+        let y: Vec<f64> = seen(&weights, &image, 0.0).iter().map(|y| y + dark).collect();
+        for method in METHODS {
+            let found = own.reconstruct(&y, &MatrixSettings::new(method)).unwrap();
+            let case = format!("{method:?}, dark {dark}: {:?}", found.dark);
+            assert!((mean_of(&found.image) / mean - 1.0).abs() < 0.05, "{case}");
+            assert!((found.dark.value() - dark).abs() < 0.5, "{case}");
         }
     }
 }

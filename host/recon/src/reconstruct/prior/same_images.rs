@@ -39,9 +39,10 @@ fn a_networks_images_are_those_that_it_made() {
         let kind = if name == "blobs" || name == "in noise" { 1 } else { 2 };
         for known in [0.3, 0.9, 3.0, -2.0] {
             let network = Half { truth: scene(side(16), kind), known };
-            for completion in [None, Some(Completion::Measured), Some(Completion::Sparse)] {
-                let made = with_network(&part, Some(&network), completion, "half").unwrap();
-                table.made(&format!("{known} known, {completion:?}, {name}"), &made);
+            let without = part.clone().with_noise(0.0).unwrap();
+            for (noise, part) in [("estimated", &part), ("no", &without)] {
+                let made = with_network(part, &network, "half").unwrap();
+                table.made(&format!("{known} known, {noise} noise, {name}"), &made);
             }
         }
     }
@@ -60,7 +61,7 @@ fn a_network_is_given_what_it_was_given() {
         table.image(&format!("image, {name}"), seen.image(seen.values()));
         let told: Vec<f64> = seen.conditions().iter().map(|&told| told.into()).collect();
         table.line(&format!("conditions, {name}"), &told);
-        let units = [seen.noise().into(), seen.unit(), seen.mean(), seen.noise_in_units()];
+        let units = [seen.noise().into(), seen.unit(), seen.mean()];
         table.line(&format!("units, {name}"), &units);
         let half: Vec<f32> = seen.values().iter().map(|v| 0.5 * v).collect();
         table.line(&format!("residual, {name}"), &[seen.residual(&half)]);

@@ -4,7 +4,7 @@
 use crate::basis::Basis;
 use crate::reconstruct::regularised::tikhonov;
 use crate::reconstruct::selection::SIGMAS_PER_MEDIAN;
-use crate::reconstruct::{NoiseLevel, Problem};
+use crate::reconstruct::{HeldBack, NoiseLevel, Problem, weight};
 use crate::{Measurements, Rows, Side, fwht, order};
 
 /// Iterations of conjugate gradients for the start, as in training.
@@ -111,7 +111,7 @@ impl Seen {
         let every: Vec<usize> = (0..measured.len()).collect();
         let part = Measurements::trusted(Rows::trusted(self.side, measured), values);
         let noise = NoiseLevel::Known(self.noise.max(LEAST_NOISE).into());
-        let problem = Problem::of(&part, Basis::Dct, 1.0, noise);
+        let problem = Problem::of(&part, Basis::Dct, Some(1.0), noise);
         let mut start = tikhonov::predict(&problem, &every, &[1.0], ITERATIONS).remove(0);
         let unit = (problem.unit * n) as f32;
         for ((start, value), mask) in start.iter_mut().zip(&self.values).zip(&self.mask) {
@@ -188,9 +188,17 @@ impl Seen {
         (value / self.side.pixels() as f64 / self.unit) as f32
     }
 
-    /// Noise of a measurement in the measurements' units.
-    pub(super) fn noise_in_units(&self) -> f64 {
-        f64::from(self.noise) * self.unit * self.side.pixels() as f64
+    /// Judges predictions, one for each measurement.
+    pub(super) fn judge(&self, rows: &Rows, predicted: &[f32]) -> Option<HeldBack> {
+        let values: Vec<f32> = rows.iter().map(|&row| self.values[row as usize]).collect();
+        HeldBack::of(rows, &values, predicted, 1.0)
+    }
+
+    /// Replaces measured rows of `grid`, a completion, by weighted means of reading and completion,
+    /// and gives the mean weight of the readings. `noise` is in the measurements' units.
+    pub(super) fn weigh(&self, rows: &Rows, noise: f64, grid: &mut [f32]) -> f64 {
+        let noise = self.in_units(noise);
+        weight::weigh_each(rows, |k| (self.values[rows[k] as usize], noise), grid)
     }
 
     /// Norm of the difference between measurements and coefficients, relative to the measurements'

@@ -64,7 +64,7 @@ fn a_network_that_is_right_is_believed_and_one_that_is_wrong_is_not() {
 }
 
 #[test]
-fn what_the_network_cannot_take_is_tikhonov_and_says_so() {
+fn what_the_network_cannot_complete_is_tikhonov_and_says_so() {
     let tikhonov = Method::TIKHONOV.prepare(&MethodSettings::default()).unwrap();
     let part = |n: u64, share: f64| {
         let truth = scene(side(n), 1);
@@ -73,7 +73,6 @@ fn what_the_network_cannot_take_is_tikhonov_and_says_so() {
     let flat = measured(side(32), &scene(side(32), 4)).take(None, 0.5).unwrap();
     let dark = measured(side(32), &[0.0; 1024]).take(None, 0.5).unwrap();
     for (part, words) in [
-        (part(8, 1.0), "the network oracle does not take 8 x 8 pixels"),
         (part(32, 0.01), "10 patterns measured, expected at least 40 for the network"),
         (part(64, 0.02), "82 patterns measured, expected at least 123 for the network"),
         (flat, "the measurements show no contrast"),
@@ -88,9 +87,15 @@ fn what_the_network_cannot_take_is_tikhonov_and_says_so() {
     let least = ready(Oracle { truth: Some(scene(side(32), 1)), seed: 0 });
     let made = least.reconstruct(&part(32, 40.0 / 1024.0)).unwrap();
     assert!(!made.report.note.is_some_and(|note| note.contains("expected at least")));
-    let alone = Method::PRIOR.prepare(&MethodSettings::default()).unwrap();
-    let made = alone.reconstruct(&part(32, 0.3)).unwrap();
-    assert!(made.report.to_string().ends_with("no network was given"), "{}", made.report);
+}
+
+#[test]
+fn a_side_that_the_network_does_not_take_is_an_error() {
+    let small = measured(side(8), &scene(side(8), 1));
+    let error = ready(Oracle { truth: None, seed: 1 }).reconstruct(&small).unwrap_err().to_string();
+    let words = "the network oracle does not complete images of 8 x 8 pixels: choose another \
+                 method, such as tikhonov";
+    assert_eq!(error, words);
 }
 
 #[test]
@@ -101,14 +106,13 @@ fn a_constant_image_stays_constant() {
 }
 
 #[test]
-fn to_keep_measured_values_keeps_them_exactly() {
+fn readings_without_noise_are_kept_exactly() {
     let truth = scene(side(32), 1);
     let all = measured(side(32), &truth);
     let blurred: Vec<f64> = truth.iter().map(|v| v * 0.99).collect();
     let network = Some(SharedNetwork::new(Oracle { truth: Some(blurred), seed: 0 }));
-    let completion = Some(Completion::Measured);
-    let settings = MethodSettings { network, completion, ..MethodSettings::default() };
-    let part = all.take(Some(&Order::ZigZag), 0.3).unwrap();
+    let settings = MethodSettings { network, ..MethodSettings::default() };
+    let part = all.take(Some(&Order::ZigZag), 0.3).unwrap().with_noise(0.0).unwrap();
     let made = Method::PRIOR.prepare(&settings).unwrap().reconstruct(&part).unwrap();
     assert!(made.report.trust.unwrap() > 0.5, "{}", made.report);
     let found = coefficients(&made.image);

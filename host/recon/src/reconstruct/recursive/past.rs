@@ -53,11 +53,12 @@ pub(super) struct Known {
 impl Past {
     /// The frame in the units of the past, with a prior for its light.
     pub fn problem_of<'f>(&self, frame: &'f Measurements, noise: NoiseLevel) -> Problem<'f> {
-        let mut problem = Problem::of(frame, Basis::Dct, FALLOFF, noise);
+        let mut problem = Problem::of(frame, Basis::Dct, Some(FALLOFF), noise);
         let change = (problem.unit / self.unit) as f32;
         problem.unit = self.unit;
         problem.values.iter_mut().for_each(|value| *value *= change);
         problem.prior.noise *= change;
+        problem.reading_noise = problem.reading_noise.map(|noise| noise * change);
         problem.prior.scale.iter_mut().for_each(|scale| *scale *= change);
         // The mean of the image says nothing about the size of the other coefficients, and is not
         // expected to be near 0.

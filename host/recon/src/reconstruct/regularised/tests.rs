@@ -50,7 +50,7 @@ fn each_minimum_is_one() {
     let part = measured(side, &scene(side, 1)).take(Some(&Order::ZigZag), 0.5).unwrap();
     let mut random = Pcg64::seed_from_u64(3);
     for penalty in ALL {
-        let problem = Problem::of(&part, Basis::Dct, 1.0, NoiseLevel::Known(0.5));
+        let problem = Problem::of(&part, Basis::Dct, Some(1.0), NoiseLevel::Known(0.5));
         let every: Vec<usize> = (0..part.rows().len()).collect();
         let predict = match penalty {
             Penalty::Tikhonov => tikhonov::predict,
@@ -144,7 +144,7 @@ fn settings_that_make_no_sense_are_named() {
     for strength in [Strength::CrossValidated { folds: 2 }, Strength::Fixed(1e6)] {
         assert_eq!(RegularisedSettings { strength, ..sound }.check(), Ok(()));
     }
-    let falloff = RegularisedSettings { falloff: -1.0, ..sound };
+    let falloff = RegularisedSettings { falloff: Some(-1.0), ..sound };
     assert!(refused(falloff).starts_with("falloff is -1"));
 }
 
@@ -155,7 +155,7 @@ fn tikhonov_beats_zero_filling_on_real_measurements_at_every_share() {
         let rows = Rows::new(side(size), array::<i32>(&mut file, "h_row")).unwrap();
         let all = if field == "y" {
             let y: Vec<f64> = array::<f32>(&mut file, "y").into_iter().map(f64::from).collect();
-            Measurements::from_pairs(&rows, &y).unwrap().0
+            Measurements::from_pairs(&rows, &y).unwrap().measurements
         } else {
             let d: Vec<f64> = array::<i32>(&mut file, "d").into_iter().map(f64::from).collect();
             Measurements::from_differential(&rows, &d[..rows.len()]).unwrap()

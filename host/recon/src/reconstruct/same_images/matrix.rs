@@ -23,7 +23,7 @@ fn own_patterns_make_the_images_that_they_made() {
             (MatrixMethod::Penalty(Penalty::TotalVariation), "total variation"),
             (MatrixMethod::Omp, "OMP"),
         ] {
-            let base = MatrixSettings::new(method);
+            let base = MatrixSettings { dark: false, ..MatrixSettings::new(method) };
             for (what, settings) in [
                 ("default", base.clone()),
                 ("strength 0.01", MatrixSettings { strength: Some(0.01), ..base.clone() }),

@@ -11,12 +11,12 @@ fn add(table: &mut Table, name: &str, found: &OmpReconstruction) {
 
 fn settings() -> Vec<(&'static str, OmpSettings)> {
     let base = OmpSettings::default();
-    let sparse = OmpSettings { completion: Completion::Sparse, ..base };
+    let sparse = OmpSettings { exactly_sparse: true, ..base };
     vec![
         ("to the noise", OmpSettings { sparsity: Sparsity::Noise, ..base }),
         ("30 atoms", OmpSettings { sparsity: Sparsity::Fixed(30), ..sparse }),
         ("residual 0.1", OmpSettings { sparsity: Sparsity::Fixed(60), residual: 0.1, ..sparse }),
-        ("known noise", OmpSettings { noise: NoiseLevel::Known(1.5), falloff: 0.6, ..base }),
+        ("known noise", OmpSettings { noise: NoiseLevel::Known(1.5), falloff: Some(0.6), ..base }),
         (
             "three parts, well seen",
             OmpSettings {

@@ -47,14 +47,7 @@ fn frames_of_a_recursive_estimate_are_those_that_were_made() {
                 "speed 0.3, not followed, known noise",
                 RecursiveSettings { speed_px: Some(0.3), follow: false, noise: known, ..base },
             ),
-            (
-                "strength 0.5, sparse",
-                RecursiveSettings {
-                    strength: Strength::Fixed(0.5),
-                    completion: Completion::Sparse,
-                    ..base
-                },
-            ),
+            ("strength 0.5", RecursiveSettings { strength: Strength::Fixed(0.5), ..base }),
         ] {
             if n == 32 && what != "default" {
                 continue;

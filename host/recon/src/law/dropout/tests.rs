@@ -1,3 +1,4 @@
+use crate::law::Reading;
 use crate::testing::{Noise, array, correlation_of, readings, real_data, scene, side};
 use crate::{Measurements, Rows, reconstruct};
 use proptest::prelude::*;
@@ -23,7 +24,7 @@ proptest! {
         kind in 0_u8..5, dark in 0.0..0.5, seed: u64, sigma in 0.0..0.3
     ) {
         let (rows, y) = recorded(32, kind, dark, Noise::Normal { sigma, seed });
-        let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
+        let Reading { measurements: measured, dropouts, .. } = Measurements::from_pairs(&rows, &y).unwrap();
         prop_assert_eq!(dropouts, vec![]);
         prop_assert_eq!(measured.rows().len(), rows.len());
     }
@@ -33,7 +34,7 @@ proptest! {
         kind in 0_u8..5, photons in 0.2..200.0, seed: u64
     ) {
         let (rows, y) = recorded(32, kind, 0.0, Noise::Poisson { photons, seed });
-        let (_, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
+        let Reading { dropouts, .. } = Measurements::from_pairs(&rows, &y).unwrap();
         prop_assert_eq!(dropouts, vec![]);
     }
 
@@ -64,7 +65,7 @@ proptest! {
             y[end] = floor + (whole[end] - floor) * partial;
             end += 1;
         }
-        let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
+        let Reading { measurements: measured, dropouts, .. } = Measurements::from_pairs(&rows, &y).unwrap();
         prop_assert_eq!(dropouts.len(), 1);
         let found = &dropouts[0];
         prop_assert!(found.start <= start && found.start + found.length >= start + length, "{:?}", found);
@@ -72,7 +73,7 @@ proptest! {
         for row in &found.rows {
             prop_assert!(!measured.rows().contains(row));
         }
-        let (full, _) = Measurements::from_pairs(&rows, &whole).unwrap();
+        let Reading { measurements: full, .. } = Measurements::from_pairs(&rows, &whole).unwrap();
         let kept = Measurements::from_differential(
             measured.rows(),
             &measured.rows().iter().map(|&r| full.values()[r as usize]).collect::<Vec<_>>(),
@@ -89,11 +90,12 @@ proptest! {
 #[test]
 fn short_runs_hardly_change_the_image() {
     let (rows, whole) = recorded(32, 1, 0.1, Noise::Normal { sigma: 1e-4, seed: 1 });
-    let (full, _) = Measurements::from_pairs(&rows, &whole).unwrap();
+    let Reading { measurements: full, .. } = Measurements::from_pairs(&rows, &whole).unwrap();
     for start in [301, 700, 1501, 2020] {
         let mut y = whole.clone();
         y[start..start + 20].fill(0.0);
-        let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
+        let Reading { measurements: measured, dropouts, .. } =
+            Measurements::from_pairs(&rows, &y).unwrap();
         assert_eq!((dropouts[0].start, dropouts[0].length), (start, 20));
         let (a, b) = (reconstruct::hadamard(&measured), reconstruct::hadamard(&full));
         assert!(correlation_of(&a, &b) > 0.99, "run at {start}: {}", correlation_of(&a, &b));
@@ -113,11 +115,11 @@ fn short_runs_hardly_change_the_image() {
 fn two_runs_are_two_and_a_dimming_lamp_is_none() {
     let (rows, mut y) = recorded(16, 0, 0.0, Noise::Normal { sigma: 1e-3, seed: 5 });
     y[100..120].iter_mut().for_each(|y| *y *= 0.7);
-    let (_, none) = Measurements::from_pairs(&rows, &y).unwrap();
+    let Reading { dropouts: none, .. } = Measurements::from_pairs(&rows, &y).unwrap();
     assert_eq!(none, vec![]);
     y[31..36].fill(0.0);
     y[400] = 0.0;
-    let (_, two) = Measurements::from_pairs(&rows, &y).unwrap();
+    let Reading { dropouts: two, .. } = Measurements::from_pairs(&rows, &y).unwrap();
     let found: Vec<_> = two.iter().map(|d| (d.start, d.length, d.rows.clone())).collect();
     assert_eq!(found, [(31, 5, vec![15, 16, 17]), (400, 1, vec![200])]);
 }
@@ -127,13 +129,13 @@ fn a_detector_of_negative_polarity_is_the_same_upside_down() {
     let (rows, mut y) = recorded(16, 0, 0.0, Noise::Normal { sigma: 1e-3, seed: 5 });
     y[60..70].fill(0.0);
     y.iter_mut().for_each(|y| *y = -*y);
-    let (_, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
+    let Reading { dropouts, .. } = Measurements::from_pairs(&rows, &y).unwrap();
     assert_eq!((dropouts[0].start, dropouts[0].length), (60, 10));
 }
 
 /// Start and length of each drop-out.
 fn runs(rows: &Rows, y: &[f64]) -> Vec<(usize, usize)> {
-    let (_, dropouts) = Measurements::from_pairs(rows, y).unwrap();
+    let Reading { dropouts, .. } = Measurements::from_pairs(rows, y).unwrap();
     dropouts.iter().map(|found| (found.start, found.length)).collect()
 }
 
@@ -191,13 +193,15 @@ fn runs_cut_into_the_real_recording_are_found() {
     let Some(mut file) = real_data("opar_ala1.npz") else { return };
     let rows = Rows::new(side(64), array::<i32>(&mut file, "h_row")).unwrap();
     let whole: Vec<f64> = array::<f32>(&mut file, "y").into_iter().map(f64::from).collect();
-    let (full, none) = Measurements::from_pairs(&rows, &whole).unwrap();
+    let Reading { measurements: full, dropouts: none, .. } =
+        Measurements::from_pairs(&rows, &whole).unwrap();
     assert_eq!(none, vec![]);
     for length in [1, 2, 3, 7, 20, 101, 200] {
         for start in [2, 5, 900, 3333, 7000, whole.len() - length] {
             let mut y = whole.clone();
             y[start..start + length].fill(0.0);
-            let (measured, dropouts) = Measurements::from_pairs(&rows, &y).unwrap();
+            let Reading { measurements: measured, dropouts, .. } =
+                Measurements::from_pairs(&rows, &y).unwrap();
             let found: Vec<_> = dropouts.iter().map(|d| (d.start, d.length)).collect();
             assert_eq!(found, [(start, length)]);
             let alike =

@@ -15,6 +15,7 @@
 //! Next to a lost pair, a pair that is down by less is lost too: the run started or ended inside
 //! the integration time of a reading.
 
+use super::robust::{self, median, running_median};
 use std::ops::Range;
 
 /// A run of raw readings in which the detector or its logger delivered no signal.
@@ -30,7 +31,7 @@ pub struct Dropout {
 
 impl Dropout {
     /// The pairs that the run touches.
-    pub(crate) fn pairs(&self) -> Range<usize> {
+    pub(super) fn pairs(&self) -> Range<usize> {
         self.start / 2..(self.start + self.length).div_ceil(2)
     }
 }
@@ -55,12 +56,9 @@ const EDGE_SIGMAS: f64 = 5.0;
 const EDGE_SHARE: f64 = 0.005;
 /// A reading is near zero if it keeps less than this share of the local mean reading.
 const NEAR_ZERO_SHARE: f64 = 0.25;
-/// 90 % of normally distributed values above the mean are within this many standard deviations.
-const SIGMAS_OF_NINE_TENTHS: f64 = 1.645;
 
-/// Finds the drop-outs in finite readings `y = [+, -, +, -, ...]` of `rows`, in time order.
-pub(crate) fn find(rows: &[u32], y: &[f64]) -> Vec<Dropout> {
-    let pairs = y.as_chunks::<2>().0;
+/// Finds the drop-outs in finite pairs of readings of `rows`, in time order.
+pub(super) fn find(rows: &[u32], pairs: &[[f64; 2]]) -> Vec<Dropout> {
     let mut sums: Vec<f64> = pairs.iter().map(|[plus, minus]| plus + minus).collect();
     // A detector of negative polarity gives the same readings with the opposite sign.
     let sign = if median(sums.clone()) < 0.0 { -1.0 } else { 1.0 };
@@ -79,8 +77,11 @@ pub(crate) fn find(rows: &[u32], y: &[f64]) -> Vec<Dropout> {
     let fell_by = |k: usize, sigmas: f64, share: f64| {
         fall[k] > (sigmas * sigma).max(share * (level[k] - 2.0 * dark).abs())
     };
+    // The complement of the all-ones pattern is dark in every recording: its reading near zero says
+    // nothing.
+    let shows_loss = |k: usize| if rows[k] == 0 { &pairs[k][..1] } else { &pairs[k][..] };
     let lost = |k: usize| {
-        fell_by(k, LOST_SIGMAS, LOST_SHARE) && pairs[k].iter().any(|&y| near_zero(y, level[k]))
+        fell_by(k, LOST_SIGMAS, LOST_SHARE) && shows_loss(k).iter().any(|&y| near_zero(y, level[k]))
     };
     let partly = |k: usize| fell_by(k, EDGE_SIGMAS, EDGE_SHARE);
 
@@ -117,7 +118,7 @@ pub(crate) fn find(rows: &[u32], y: &[f64]) -> Vec<Dropout> {
 
 /// The sum that each pair would have without a drop-out: the line through the medians of the first
 /// and the last third of its nearest whole neighbours. `dark` is the sum without light.
-fn local_level(sums: &[f64], dark: f64) -> Vec<f64> {
+pub(super) fn local_level(sums: &[f64], dark: f64) -> Vec<f64> {
     let coarse = running_median(sums, COARSE_PAIRS);
     let fall: Vec<f64> = coarse.iter().zip(sums).map(|(coarse, sum)| coarse - sum).collect();
     let sigma = spread(&fall);
@@ -144,50 +145,16 @@ fn local_level(sums: &[f64], dark: f64) -> Vec<f64> {
 
 /// The detector's reading without light: the complement of the all-ones pattern, if it was
 /// recorded, else the lowest reading.
-fn dark_level(rows: &[u32], pairs: &[[f64; 2]], sign: f64) -> f64 {
+pub(super) fn dark_level(rows: &[u32], pairs: &[[f64; 2]], sign: f64) -> f64 {
     let lowest = pairs.iter().flatten().map(|y| sign * y).fold(f64::INFINITY, f64::min);
     let recorded = rows.iter().position(|&row| row == 0).map(|k| sign * pairs[k][1]);
     recorded.unwrap_or(lowest)
 }
 
 /// Standard deviation of the pair sums about their level, from the sums *above* the level, because
-/// no drop-out is among those. Nine tenths of them are used, not half, because single photons leave
-/// most sums equal to their median.
+/// no drop-out is among those.
 fn spread(fall: &[f64]) -> f64 {
-    let mut above: Vec<f64> = fall.iter().filter(|fall| **fall <= 0.0).map(|fall| -fall).collect();
-    if above.is_empty() {
-        return 0.0;
-    }
-    let nine_tenths = above.len() * 9 / 10;
-    *above.select_nth_unstable_by(nine_tenths, f64::total_cmp).1 / SIGMAS_OF_NINE_TENTHS
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// Median of the `window` values nearest to each value; the window stays inside the data at both
-/// ends.
-fn running_median(values: &[f64], window: usize) -> Vec<f64> {
-    let window = window.min(values.len());
-    let mut sorted = values[..window].to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let mut start = 0;
-    (0..values.len())
-        .map(|k| {
-            let wanted = k.saturating_sub(window / 2).min(values.len() - window);
-            while start < wanted {
-                let place =
-                    |sorted: &[f64], v: f64| sorted.partition_point(|s| s.total_cmp(&v).is_lt());
-                sorted.remove(place(&sorted, values[start]));
-                let new = values[start + window];
-                sorted.insert(place(&sorted, new), new);
-                start += 1;
-            }
-            sorted[window / 2]
-        })
-        .collect()
+    robust::deviation(fall.iter().filter(|fall| **fall <= 0.0).map(|fall| -fall))
 }
 
 #[cfg(test)]

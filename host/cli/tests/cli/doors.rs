@@ -1,0 +1,80 @@
+//! The same recording gives the same picture, whichever command makes it.
+
+use crate::bench::Bench;
+use crate::serve::serve;
+use nirspi::calibration::FlatField;
+use nirspi::files::image::read_grey;
+use nirspi::imaging::enhance_frames;
+use nirspi::source::{Source, SourceOptions};
+use nirspi::stage_times::StageTimes;
+use nirspi_recon::reconstruct::{Method, MethodSettings};
+
+/// Bright LEDs that differ by a fifth, one of them dead, so that the flat field shows.
+const UNEQUAL: &[u8] = b"[leds]\npower_mw = 40\npower_spread = 0.2\ndead = [[3, 7]]\n";
+
+#[test]
+fn one_recording_gives_one_picture_through_every_door() {
+    let bench = Bench::new();
+    bench.write("lab.toml", UNEQUAL);
+    let lab = ["--camera-model", "lab.toml"];
+    bench.run(&[&["calibrate", "--white", "--sweeps", "200"][..], &lab].concat()).succeeded();
+    let capture = ["capture", "--frames", "40", "--out", "rec.mcap", "--picture", "seen"];
+    done(&bench, &[&capture[..], &lab].concat());
+    done(&bench, &["reconstruct", "rec.mcap", "--enhance", "--out", "rec"]);
+    let plain = ["reconstruct", "rec.mcap", "--enhance", "--no-flat-field", "--out", "plain"];
+    done(&bench, &plain);
+    for name in ["image.npy", "enhanced.npy"] {
+        let door = |folder: &str| bench.pixels(&format!("{folder}/{name}"));
+        assert_eq!(door("seen"), door("rec"), "{name}");
+        // The flat field is part of the picture.
+        assert_ne!(door("rec"), door("plain"), "{name}");
+    }
+    let picture = |folder: &str| read_grey(&bench.path(&format!("{folder}/enhanced.png"))).unwrap();
+    assert_eq!(picture("seen"), picture("rec"));
+
+    // The library's functions, as `demo` calls them. The flat field lies where the program kept it.
+    let source = Source::read(&bench.path("rec.mcap"), &SourceOptions::default()).unwrap();
+    assert!(source.flat_field.is_none(), "a flat field of this user's own");
+    let ready = Method::default().prepare(&MethodSettings::default()).unwrap();
+    let image = ready.reconstruct(&source.measurements).unwrap().image;
+    let flat = kept(&bench);
+    assert_eq!(image.pixels(), bench.pixels("plain/image.npy"));
+    let image = FlatField::corrected(Some(&flat), image);
+    assert_eq!(image.pixels(), bench.pixels("rec/image.npy"));
+    let rows = source.measurements.rows();
+    let (sharp, _) = enhance_frames(&[(&image, rows)], &mut StageTimes::default()).unwrap();
+    assert_eq!(sharp, bench.pixels("rec/enhanced.npy"));
+
+    // The live page of the recording, once it has summed all frames.
+    let server = serve(&bench, &["--camera", "replay:rec.mcap,100", "--sum", "40"]);
+    server.state("of all frames", |state| state["picture"]["frames"] == 40);
+    let answer = server.get("/image.npy");
+    bench.write("live.npy", &answer.body);
+    assert_eq!(bench.pixels("live.npy"), bench.pixels("rec/image.npy"));
+}
+
+/// Runs a command to its end. It may warn of the image.
+#[track_caller]
+fn done(bench: &Bench, arguments: &[&str]) {
+    let outcome = bench.run(arguments);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+}
+
+/// The flat field that `calibrate --white` has kept.
+fn kept(bench: &Bench) -> FlatField {
+    let mut folders = vec![bench.path("data")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+            let path = entry.path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() {
+                folders.push(path);
+            } else if name.contains("flat") {
+                let json: serde_json::Value =
+                    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+                return serde_json::from_value(json["flat"].clone()).unwrap();
+            }
+        }
+    }
+    panic!("no flat field is kept");
+}

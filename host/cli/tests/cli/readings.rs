@@ -1,0 +1,152 @@
+//! Readings that are not what they are said to be, and readings that light cannot have given.
+
+use crate::bench::{Bench, Measured, correlation, npz};
+use nirspi::files::npy;
+
+/// The readings of the phantom, 16 x 16, natural order, as an array alone.
+fn phantom(bench: &Bench, change: impl Fn(Vec<f32>) -> Vec<f32>) -> Measured {
+    let measured = Measured::new(16);
+    let mut y = vec![0.0; 512];
+    for (k, &row) in measured.h_row.iter().enumerate() {
+        y[2 * row as usize..][..2].copy_from_slice(&measured.y[2 * k..2 * k + 2]);
+    }
+    let y = change(y);
+    bench.write("in.npy", &npy::encode(&[y.len()], &y));
+    measured
+}
+
+/// The lines and the report of a reconstruction, whose exit code is 0.
+fn said(bench: &Bench, more: &[&str]) -> (String, serde_json::Value) {
+    let all = [&["reconstruct", "in.npy", "--shown", "natural"], more].concat();
+    let outcome = bench.run(&all).succeeded();
+    (outcome.stdout, bench.json("out/report.json"))
+}
+
+#[test]
+fn right_readings_get_no_warning() {
+    let bench = Bench::new();
+    let measured = phantom(&bench, |y| y);
+    let (lines, report) = said(&bench, &[]);
+    assert!(!lines.contains("warning") && !lines.contains("outlier"), "{lines}");
+    assert_eq!(
+        (&report["warnings"], &report["outliers"]),
+        (&vec![(); 0].into(), &vec![(); 0].into())
+    );
+    assert!(correlation(&bench.pixels("out/image.npy"), &measured.image) > 0.999);
+}
+
+#[test]
+fn readings_of_another_form_get_a_warning_that_names_the_form() {
+    let bench = Bench::new();
+    type Change = fn(Vec<f32>) -> Vec<f32>;
+    let cases: [(&str, Change, &[&str]); 6] = [
+        (
+            "halves",
+            |y| y.iter().step_by(2).chain(y.iter().skip(1).step_by(2)).copied().collect(),
+            &["512 readings: ", "below the all-off reading", "try --readings halves"],
+        ),
+        (
+            "complements first",
+            |y| y.as_chunks::<2>().0.iter().flat_map(|p| [p[1], p[0]]).collect(),
+            &["complement first"],
+        ),
+        ("inverted", |y| y.iter().map(|y| -y).collect(), &["inverting amplifier"]),
+        ("early", |y| [&y[1..], &y[..1]].concat(), &["one reading early"]),
+        ("late", |y| [&y[..1], &y[..511]].concat(), &["one reading late"]),
+        ("samples", |y| y.iter().flat_map(|&y| [y; 4]).collect(), &["4 samples of each reading"]),
+    ];
+    for (name, change, words) in cases {
+        phantom(&bench, change);
+        let (lines, report) = said(&bench, &[]);
+        let warning = report["warnings"][0].as_str().unwrap_or_default();
+        for word in words {
+            assert!(warning.contains(word) && lines.contains("warning: "), "{name}: {lines}");
+        }
+    }
+    phantom(&bench, cases[0].1);
+    let (lines, report) = said(&bench, &["--readings", "halves"]);
+    assert!(report["warnings"].as_array().unwrap().is_empty(), "{lines}");
+}
+
+#[test]
+fn several_sweeps_are_counted_unless_the_user_says_the_side() {
+    let bench = Bench::new();
+    phantom(&bench, |y| y.repeat(4));
+    let (_, report) = said(&bench, &[]);
+    assert!(
+        report["warnings"][0].as_str().unwrap().contains("4 sweeps one after another"),
+        "{report}"
+    );
+    let (_, report) = said(&bench, &["--side", "32"]);
+    assert!(report["warnings"].as_array().unwrap().is_empty(), "{report}");
+}
+
+#[test]
+fn one_impossible_reading_is_left_out_and_stands_in_the_report() {
+    let bench = Bench::new();
+    for (at, factor) in [(77, 3.0), (300, 8.0), (301, 1e3), (0, 1e30), (511, 1e30)] {
+        let measured = phantom(&bench, |mut y| {
+            y[at] *= factor;
+            y
+        });
+        let (lines, report) = said(&bench, &[]);
+        assert_eq!(report["outliers"][0]["reading"], at, "{lines}");
+        assert!(lines.contains(&format!("outlier: reading [{at}]")), "{lines}");
+        assert_eq!(
+            (&report["measurements"], &report["outliers"][1]),
+            (&255.into(), &().into()),
+            "{lines}"
+        );
+        let alike = correlation(&bench.pixels("out/image.npy"), &measured.image);
+        assert!(alike > 0.99, "{at}: {alike}");
+    }
+}
+
+#[test]
+fn an_instruments_word_for_overload_is_no_reading() {
+    let bench = Bench::new();
+    let measured = phantom(&bench, |mut y| {
+        (y[40], y[300]) = (9.9e37, 9.91e37);
+        y
+    });
+    let (lines, report) = said(&bench, &[]);
+    assert_eq!(report["not_read"], serde_json::json!([20, 150]), "{lines}");
+    assert!(
+        report["warnings"][0].as_str().unwrap().starts_with("overload: 2 readings are 9.9e37"),
+        "{lines}"
+    );
+    assert!(correlation(&bench.pixels("out/image.npy"), &measured.image) > 0.99);
+}
+
+#[test]
+fn patterns_of_ones_own_have_a_dark_level() {
+    let bench = Bench::new();
+    let measured = Measured::new(16);
+    let mut state = 1_u32;
+    let weights: Vec<f32> = (0..140 * 256)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 31) as f32
+        })
+        .collect();
+    let light = |p: &[f32]| p.iter().zip(&measured.image).map(|(w, v)| w * v).sum::<f32>();
+    let y: Vec<f32> = weights.chunks_exact(256).map(|p| light(p) + 500.0).collect();
+    bench.write("phi.npy", &npy::encode(&[140, 256], &weights));
+    bench.write("in.npz", &npz(&[("y", &[140], &y)]));
+    let run = |more: &[&str]| {
+        let all = ["reconstruct", "in.npz", "--matrix", "phi.npy", "--method", "tv"];
+        let lines = bench.run(&[&all, more].concat()).succeeded().stdout;
+        (
+            correlation(&bench.pixels("out/image.npy"), &measured.image),
+            bench.json("out/report.json"),
+            lines,
+        )
+    };
+    let (alike, report, lines) = run(&[]);
+    let level = report["dark_level"].as_f64().unwrap();
+    assert!(alike > 0.98 && (level / 500.0 - 1.0).abs() < 0.05, "{alike}, {lines}");
+    assert!(lines.contains("dark level "), "{lines}");
+    let (worse, report, _) = run(&["--no-dark"]);
+    assert!(worse < alike - 0.05 && report.get("dark_level").is_none(), "{worse} {report}");
+    bench.run(&["reconstruct", "in.npz", "--no-dark"]).failed(2, &["--matrix"]);
+}

@@ -1,0 +1,451 @@
+use super::*;
+use crate::law::repeats::averaged;
+use crate::testing::{Noise, array, correlation_of, readings, real_data, scene, side};
+use crate::{Order, reconstruct};
+use proptest::prelude::*;
+
+/// Raw readings of a scene: a lamp that drifts, a dark level, noise; in units of the all-on reading.
+fn recorded(rows: &Rows, kind: u8, drift: f64, dark: f64, noise: Noise) -> Vec<f64> {
+    let mut y = readings(rows.side(), rows, &scene(rows.side(), kind));
+    let total = scene(rows.side(), kind).iter().sum::<f64>();
+    let count = y.len() as f64;
+    for (i, y) in y.iter_mut().enumerate() {
+        let lamp = 1.0 + drift * (i as f64 / count);
+        *y = noise.of(*y * lamp / total, i as u64) + dark;
+    }
+    y
+}
+
+const QUIET: Noise = Noise::Normal { sigma: 1e-4, seed: 3 };
+
+fn quiet(rows: &Rows, kind: u8) -> Vec<f64> {
+    recorded(rows, kind, -0.1, 0.01, QUIET)
+}
+
+fn shown(order: &Order, n: u64) -> Rows {
+    order.rows(side(n)).unwrap()
+}
+
+fn claim(form: Form) -> Claim {
+    Claim { form, side_guessed: true }
+}
+
+/// The readings in each form that they can have.
+fn in_every_form(y: &[f64]) -> [(Form, Vec<f64>); 4] {
+    let (plus, minus): (Vec<f64>, Vec<f64>) =
+        y.as_chunks::<2>().0.iter().map(|p| (p[0], p[1])).unzip();
+    let differences = plus.iter().zip(&minus).map(|(p, m)| p - m).collect();
+    [
+        (Form::Pairs, y.to_vec()),
+        // The reader has put each pattern beside its complement.
+        (Form::Halves, y.to_vec()),
+        (Form::Single, plus),
+        (Form::Differences, differences),
+    ]
+}
+
+/// All that may be said about right readings is that they have a dark level.
+fn is_silent(rows: &Rows, y: &[f64], claim: Claim) -> Result<(), String> {
+    let found = read(rows, y, claim).unwrap();
+    match (&found.outliers[..], &found.doubts[..], &found.dropouts[..]) {
+        ([], [], []) if found.measurements.rows().len() == rows.len() => Ok(()),
+        _ => Err(format!("{:?} {:?} {:?}", found.outliers, found.doubts, found.dropouts)),
+    }
+}
+
+mod right {
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 64, max_shrink_iters: 50, ..ProptestConfig::default() })]
+
+        #[test]
+        fn readings_of_every_form_order_and_share_are_not_doubted(
+            kind in 0_u8..5,
+            order in prop::sample::select(vec![
+                Order::Natural, Order::ZigZag, Order::Random(4), Order::Sequency, Order::Walsh2d,
+            ]),
+            share in prop_oneof![Just(1.0), 0.05..1.0],
+            drift in -0.3..0.3,
+            dark in prop_oneof![Just(0.0), 0.0..2.0],
+            noise in prop_oneof![
+                (Just(0.0), any::<u64>()).prop_map(|(sigma, seed)| Noise::Normal { sigma, seed }),
+                (1e-4..0.3, any::<u64>()).prop_map(|(sigma, seed)| Noise::Normal { sigma, seed }),
+                (0.2..300.0, any::<u64>()).prop_map(|(photons, seed)| Noise::Poisson { photons, seed }),
+            ],
+        ) {
+            let rows = shown(&order, 32);
+            let rows = rows.first(((share * 1024.0) as usize).max(1));
+            // Noise of single photons has its own unit: the dark level is a part of the all-on reading.
+            let unit = match noise { Noise::Poisson { photons, .. } => photons, Noise::Normal { .. } => 1.0 };
+            let y = recorded(&rows, kind, drift, dark * unit, noise);
+            for (form, y) in in_every_form(&y) {
+                let claim = Claim { form, side_guessed: share == 1.0 };
+                let said = is_silent(&rows, &y, claim);
+                prop_assert!(said.is_ok(), "{form:?}: {said:?}");
+            }
+        }
+
+        #[test]
+        fn a_sweep_without_the_all_on_pattern_is_not_doubted(
+            kind in 0_u8..5, first in 1_usize..40, sigma in prop_oneof![Just(0.0), 0.0..0.3], seed: u64
+        ) {
+            let all = shown(&Order::ZigZag, 32);
+            let rows = Rows::new(side(32), all[first..].iter().copied()).unwrap();
+            let y = recorded(&rows, kind, 0.2, 0.1, Noise::Normal { sigma, seed });
+            for (form, y) in in_every_form(&y) {
+                let said = is_silent(&rows, &y, form.into());
+                prop_assert!(said.is_ok(), "{form:?}: {said:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn light_that_flickers_or_steps_is_not_doubted() {
+        let rows = shown(&Order::Natural, 32);
+        let changes: [(&str, fn(f64) -> f64); 5] = [
+            ("5 % at 100 Hz", |k| 1.0 + 0.05 * (k * 0.31).sin()),
+            ("10 % mains", |k| 1.0 + 0.1 * (k * 0.013).sin()),
+            ("step up", |k| if k < 700.0 { 1.0 } else { 1.3 }),
+            ("step down", |k| if k < 701.0 { 1.0 } else { 0.7 }),
+            ("warming up", |k| 1.0 - 0.05 * (-k / 300.0).exp()),
+        ];
+        for kind in 0..5 {
+            for (name, lamp) in changes {
+                // Half of the readings of a point are dark, and a step of the lamp beside them looks like a
+                // drop-out.
+                if kind == 3 && name.starts_with("step") {
+                    continue;
+                }
+                let mut y = recorded(&rows, kind, 0.0, 0.02, QUIET);
+                y.iter_mut().enumerate().for_each(|(k, y)| *y *= lamp(k as f64));
+                for (form, y) in in_every_form(&y) {
+                    if form == Form::Single {
+                        // A single reading does not know the lamp.
+                        continue;
+                    }
+                    let said = is_silent(&rows, &y, form.into());
+                    assert!(said.is_ok(), "{name}, scene {kind}, {form:?}: {said:?}");
+                }
+            }
+        }
+    }
+
+    /// Photon counts of a mirror array that collects twice the light of coarse patterns, the differences of
+    /// a car, and the wing.
+    #[test]
+    fn real_recordings_are_not_doubted() {
+        for name in ["photon_40ms.npy", "photon_80ms.npy"] {
+            let Some(y) = photons(name) else { return };
+            let rows = shown(&Order::Natural, 32);
+            for (form, y) in in_every_form(&y) {
+                // The two exposures have a lamp that changes: only pairs know that.
+                let said = is_silent(&rows, &y, claim(form));
+                assert!(said.is_ok(), "{name}, {form:?}: {said:?}");
+            }
+        }
+        let Some(mut car) = real_data("scheidt_car.npz") else { return };
+        let rows = Rows::new(side(32), array::<i32>(&mut car, "h_row")).unwrap();
+        let d: Vec<f64> = array::<i32>(&mut car, "d").into_iter().map(f64::from).collect();
+        for (detector, d) in d.chunks_exact(1024).enumerate() {
+            let said = is_silent(&rows, d, claim(Form::Differences));
+            assert!(said.is_ok(), "detector {detector}: {said:?}");
+        }
+        let Some(mut wing) = real_data("opar_ala1.npz") else { return };
+        let rows = Rows::new(side(64), array::<i32>(&mut wing, "h_row")).unwrap();
+        let y: Vec<f64> = array::<f32>(&mut wing, "y").into_iter().map(f64::from).collect();
+        for (form, y) in in_every_form(&y) {
+            let said = is_silent(&rows, &y, claim(form));
+            assert!(said.is_ok(), "wing, {form:?}: {said:?}");
+        }
+    }
+}
+
+/// Real photon counts, pattern and complement, natural order, 32 x 32.
+fn photons(name: &str) -> Option<Vec<f64>> {
+    let folder = std::env::var_os("NIRSPI_DATA").map(std::path::PathBuf::from)?;
+    let bytes = std::fs::read(folder.join("spi").join(name)).ok()?;
+    Some(npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap())
+}
+
+/// Recordings of which the all-on pattern comes first, with their names.
+fn recordings() -> Vec<(String, Rows, Vec<f64>)> {
+    let mut all = Vec::new();
+    for (order, n) in
+        [(Order::Natural, 16), (Order::ZigZag, 32), (Order::Random(1), 32), (Order::Walsh2d, 16)]
+    {
+        for kind in 0..3 {
+            let rows = shown(&order, n);
+            let y = quiet(&rows, kind);
+            all.push((format!("{order}, {n} px, scene {kind}"), rows, y));
+            let rows = shown(&order, n);
+            let noise = Noise::Normal { sigma: 0.005, seed: 8 };
+            let y = recorded(&rows, kind, 0.1, 0.0, noise);
+            all.push((format!("{order}, {n} px, scene {kind}, noise"), rows, y));
+        }
+    }
+    for name in ["photon_40ms.npy", "photon_80ms.npy"] {
+        all.extend(photons(name).map(|y| (name.to_owned(), shown(&Order::Natural, 32), y)));
+    }
+    if let Some(mut wing) = real_data("opar_ala1.npz") {
+        let rows = Rows::new(side(64), array::<i32>(&mut wing, "h_row")).unwrap();
+        let y = array::<f32>(&mut wing, "y").into_iter().map(f64::from).collect();
+        all.push(("wing".to_owned(), rows, y));
+    }
+    all
+}
+
+fn explanation(rows: &Rows, y: &[f64], claim: Claim) -> Option<Explanation> {
+    let found = read(rows, y, claim).unwrap();
+    // What is wrong with all readings is no reason to leave some out.
+    let of = |doubt: &Doubt| match *doubt {
+        Doubt::Form { explanation, .. } | Doubt::Repeated { explanation, .. } => Some(explanation),
+        _ => None,
+    };
+    let explanation = found.doubts.iter().find_map(of);
+    if explanation.is_some() {
+        assert_eq!((found.outliers, found.dropouts), (vec![], vec![]));
+    }
+    explanation
+}
+
+#[test]
+fn readings_of_another_form_are_named_by_it() {
+    for (name, rows, y) in recordings() {
+        let count = rows.len();
+        let said = |y: &[f64], form: Form, expected: Explanation| {
+            let found = explanation(&rows, y, form.into());
+            assert_eq!(found, Some(expected), "{name}");
+        };
+        let half = |reading: usize| y.iter().skip(reading).step_by(2).copied();
+        let halves: Vec<f64> = half(0).chain(half(1)).collect();
+        said(&halves, Form::Pairs, Explanation::Form(Form::Halves));
+        // The reader has taken the first half of the pairs for patterns.
+        let split: Vec<f64> = (0..count).flat_map(|k| [y[k], y[count + k]]).collect();
+        said(&split, Form::Halves, Explanation::Form(Form::Pairs));
+        let swapped: Vec<f64> = y.as_chunks::<2>().0.iter().flat_map(|[p, m]| [*m, *p]).collect();
+        said(&swapped, Form::Pairs, Explanation::ComplementsFirst(Form::Pairs));
+        let inverted: Vec<f64> = y.iter().map(|y| 0.002 - y).collect();
+        let found = explanation(&rows, &inverted, Form::Pairs.into());
+        let sign = [Explanation::Inverted, Explanation::ComplementsFirst(Form::Pairs)];
+        assert!(found.is_some_and(|found| sign.contains(&found)), "{name}: {found:?}");
+        let early: Vec<f64> = y[1..].iter().chain(&y[..1]).copied().collect();
+        said(&early, Form::Pairs, Explanation::OneEarly);
+        let late: Vec<f64> = y[..1].iter().chain(&y[..y.len() - 1]).copied().collect();
+        said(&late, Form::Pairs, Explanation::OneLate);
+    }
+}
+
+#[test]
+fn readings_of_another_sign_are_named_in_every_form() {
+    for (name, rows, y) in recordings() {
+        for (form, y) in in_every_form(&y) {
+            let inverted: Vec<f64> = y.iter().map(|y| -y).collect();
+            let found = explanation(&rows, &inverted, form.into());
+            let sign = [Explanation::Inverted, Explanation::ComplementsFirst(form)];
+            assert!(
+                found.is_some_and(|found| sign.contains(&found)),
+                "{name}, {form:?}: {found:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn several_samples_and_several_sweeps_are_counted() {
+    // The Walsh functions of a letter repeat each other, as samples do.
+    let small = |(name, rows, _): &(String, Rows, Vec<f64>)| {
+        rows.side().pixels() == 16 && !name.contains("scene 2")
+    };
+    for (name, _, y) in recordings().into_iter().filter(small) {
+        for times in [4_usize, 16] {
+            let larger = Rows::natural(side(16 * times.isqrt() as u64));
+            for (form, y) in in_every_form(&y) {
+                if form == Form::Halves {
+                    continue;
+                }
+                let wobble = |k: usize| 1.0 + 1e-4 * (k as f64 * 1.7).sin();
+                let samples: Vec<f64> =
+                    (0..times * y.len()).map(|k| y[k / times] * wobble(k)).collect();
+                let found = explanation(&larger, &samples, claim(form));
+                assert_eq!(found, Some(Explanation::Samples { each: times }), "{name}, {form:?}");
+                let sweeps: Vec<f64> =
+                    (0..times * y.len()).map(|k| y[k % y.len()] * wobble(k)).collect();
+                let found = explanation(&larger, &sweeps, claim(form));
+                assert_eq!(found, Some(Explanation::Sweeps { count: times }), "{name}, {form:?}");
+                // Who says the side has one sweep.
+                let found = explanation(&larger, &sweeps, form.into());
+                assert!(!matches!(found, Some(Explanation::Sweeps { .. })), "{name}: {found:?}");
+            }
+        }
+    }
+    assert_eq!(averaged(&[1.0, 3.0, 5.0, 5.0], 2), [2.0, 5.0]);
+}
+
+#[test]
+fn patterns_of_another_order_are_named_by_their_all_on_pattern() {
+    let rows = Rows::natural(side(16));
+    let mut moved: Vec<u32> = rows.to_vec();
+    moved.swap(0, 37);
+    let y = quiet(&Rows::new(side(16), moved).unwrap(), 1);
+    for (form, y) in in_every_form(&y) {
+        if form != Form::Single {
+            let found = explanation(&rows, &y, form.into());
+            assert_eq!(found, Some(Explanation::Order { all_on: 37 }), "{form:?}");
+        }
+    }
+    // The recording starts in the middle of a sweep, with a complement.
+    let y = quiet(&rows, 1);
+    let rotated = [&y[101..], &y[..101]].concat();
+    let found = explanation(&rows, &rotated, Form::Pairs.into());
+    assert_eq!(found, Some(Explanation::Unknown));
+}
+
+/// Images with and without the pattern of a wild reading are alike, and the reading is named.
+#[test]
+fn one_wild_reading_costs_one_pattern() {
+    for (name, rows, y) in recordings() {
+        let whole = Measurements::from_pairs(&rows, &y).unwrap().measurements;
+        let floor = 0.05 * y[0];
+        for factor in [3.0, 8.0, 1e3, 1e30] {
+            for at in (0..y.len()).step_by(1 + y.len() / 7).chain([0, 1, y.len() - 1]) {
+                let mut wild = y.clone();
+                wild[at] *= factor;
+                let found = Measurements::from_pairs(&rows, &wild).unwrap();
+                let case = format!(
+                    "{name}, reading {at} times {factor}: {:?} {:?}",
+                    found.outliers, found.doubts
+                );
+                let without = whole.subset((0..rows.len()).filter(|k| *k != at / 2));
+                assert!(found.measurements.values().iter().all(|v| v.abs() < 1e9), "{case}");
+                let images = [&found.measurements, &without].map(reconstruct::hadamard);
+                let alike = correlation_of(&images[0], &images[1]);
+                assert!(alike > 0.99, "{case}: {alike}");
+                assert_eq!(found.doubts, vec![], "{case}");
+                // A dark reading times three may still be a dark reading.
+                if wild[at] - y[at] > floor {
+                    let places: Vec<usize> = found.outliers.iter().map(|o| o.reading / 2).collect();
+                    assert_eq!(places, [at / 2], "{case}");
+                    assert_eq!(found.measurements.rows().len(), rows.len() - 1, "{case}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wild_single_reading_or_difference_is_left_out_where_light_cannot_give_it() {
+    for (name, rows, y) in recordings() {
+        for (form, y) in in_every_form(&y).into_iter().skip(2) {
+            for at in (1..y.len()).step_by(1 + y.len() / 7) {
+                let mut wild = y.clone();
+                wild[at] = 4.0 * y[0];
+                let found = read(&rows, &wild, form.into()).unwrap();
+                let places: Vec<usize> = found.outliers.iter().map(|o| o.reading).collect();
+                assert_eq!(places, [at], "{name}, {form:?}: {:?}", found.doubts);
+                assert_eq!(found.outliers[0].row, rows[at]);
+                assert_eq!(found.outliers[0].value, wild[at]);
+            }
+        }
+    }
+}
+
+#[test]
+fn saturation_is_named_for_what_it_is() {
+    let rows = Rows::natural(side(16));
+    let y = quiet(&rows, 1);
+    let image = reconstruct::hadamard(&Measurements::from_pairs(&rows, &y).unwrap().measurements);
+    // The converter's end is between the all-on reading and all others.
+    let others = y[1..].iter().copied().fold(0.0, f64::max);
+    let end = 0.5 * (others + y[0]).min(1.9 * others);
+    let cut: Vec<f64> = y.iter().map(|y| y.min(end)).collect();
+    let found = Measurements::from_pairs(&rows, &cut).unwrap();
+    assert_eq!((found.dropouts.len(), found.outliers.len()), (0, 0));
+    let [Doubt::Saturated { found: told, expected }] = found.doubts[..] else {
+        panic!("{:?}", found.doubts)
+    };
+    assert!(told == end && (expected / y[0] - 1.0).abs() < 0.01, "{:?}", found.doubts);
+    let repaired = reconstruct::hadamard(&found.measurements);
+    let mean = |image: &crate::Image| image.pixels().iter().sum::<f32>();
+    assert!((mean(&repaired) / mean(&image) - 1.0).abs() < 0.01);
+    // Nearly all readings are clipped, and no drop-out is among them.
+    for share in [0.3, 0.45, 0.6] {
+        let end = share * y[0];
+        let clipped: Vec<f64> = y.iter().map(|y| y.min(end)).collect();
+        let equal = clipped.iter().filter(|y| **y == end).count();
+        let found = Measurements::from_pairs(&rows, &clipped).unwrap();
+        if equal < 6 {
+            continue;
+        }
+        assert!(found.dropouts.is_empty(), "{share}: {:?}", found.dropouts);
+        let expected =
+            Doubt::Clipped { readings: 512, equal, value: end, extreme: Extreme::Greatest };
+        assert_eq!(found.doubts, [expected], "{share}");
+    }
+    // An offset that takes dark readings below the converter's range.
+    let cut: Vec<f64> = y.iter().map(|v| (v - 0.45 * y[0]).max(0.0)).collect();
+    let equal = cut.iter().filter(|y| **y == 0.0).count();
+    let found = Measurements::from_pairs(&rows, &cut).unwrap();
+    let expected = Doubt::Clipped { readings: 512, equal, value: 0.0, extreme: Extreme::Least };
+    assert_eq!((found.dropouts.len(), &found.doubts[..]), (0, &[expected][..]), "{equal}");
+}
+
+#[test]
+fn all_readings_alike_are_no_picture() {
+    let rows = Rows::natural(side(4));
+    for (form, y) in in_every_form(&[4095.0; 32]) {
+        let found = read(&rows, &y, form.into()).unwrap();
+        match form {
+            // Pairs without a difference are a dark scene.
+            Form::Differences => assert_eq!(found.doubts, []),
+            _ => assert_eq!(found.doubts, [Doubt::AllEqual { readings: y.len(), value: 4095.0 }]),
+        }
+        assert_eq!(found.measurements.rows().len(), 16);
+    }
+}
+
+/// Readings of 0/1 patterns that light the -1: the least one is 0, and what the values have in common is
+/// no dark level.
+#[test]
+fn what_is_no_dark_level_is_not_removed() {
+    let rows = Rows::natural(side(16));
+    for kind in 0..3 {
+        let y = recorded(&rows, kind, 0.0, 0.0, QUIET);
+        let dark: Vec<f64> = y.iter().skip(1).step_by(2).copied().collect();
+        let found = read(&rows, &dark, Form::Single.into()).unwrap();
+        assert_eq!(found.dark_level, None);
+        let broken = Broken { readings: 256, above: 255, below: 0 };
+        let explanation = Explanation::Inverted;
+        assert_eq!(found.doubts, [Doubt::Form { claimed: Form::Single, broken, explanation }]);
+        // With the other sign they are a measurement.
+        let turned: Vec<f64> = dark.iter().map(|y| -y).collect();
+        let turned = read(&rows, &turned, Form::Single.into()).unwrap();
+        assert_eq!(turned.doubts, []);
+        let exact = Measurements::from_pairs(&rows, &y).unwrap().measurements;
+        let images = [&turned.measurements, &exact].map(reconstruct::hadamard);
+        assert!(correlation_of(&images[0], &images[1]) > 0.99, "scene {kind}");
+    }
+}
+
+#[test]
+fn doubts_say_numbers_and_what_to_do() {
+    let broken = Broken { readings: 512, above: 0, below: 429 };
+    let explanation = Explanation::Form(Form::Halves);
+    let doubt = Doubt::Form { claimed: Form::Pairs, broken, explanation };
+    assert_eq!(
+        doubt.to_string(),
+        "512 readings: 429 are below the all-off reading; the readings fit the form `halves`: try --readings halves"
+    );
+    let why = Impossible::AboveAllOn { all_on: 83.770_024_6 };
+    let outlier = Outlier { reading: 77, value: 32767.0, row: 38, why };
+    assert_eq!(outlier.to_string(), "32767 is above the all-on reading 83.77");
+    for (value, text) in [
+        (0.0, "0"),
+        (-0.010_833_5, "-0.0108"),
+        (1e30, "1.0000e30"),
+        (4095.0, "4095"),
+        (100.0, "100"),
+    ] {
+        assert_eq!(doubt::Short(value).to_string(), text);
+    }
+}
