@@ -9,8 +9,8 @@ use embassy_futures::select::select;
 use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::mode::Async;
 use embassy_stm32::ospi::{
-    AddressSize, Config, DummyCycles, FIFOThresholdLevel, MemorySize, MemoryType, Ospi, OspiError, OspiWidth,
-    TransferConfig,
+    AddressSize, Config, DummyCycles, FIFOThresholdLevel, MemorySize, MemoryType, Ospi, OspiError,
+    OspiWidth, TransferConfig,
 };
 use embassy_stm32::pac::OCTOSPI1 as OSPI;
 use embassy_stm32::pac::octospi::vals::SampleShift;

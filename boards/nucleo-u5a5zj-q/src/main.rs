@@ -26,7 +26,7 @@ use embassy_stm32::exti::{self, ExtiInput};
 use embassy_stm32::gpio::{Input, Level, Output, OutputOpenDrain, Pull, Speed};
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::ospi::Ospi;
-use embassy_stm32::peripherals::{GPDMA1_CH12, GPDMA1_CH1, GPDMA1_CH2, I2C1, USB_OTG_HS};
+use embassy_stm32::peripherals::{GPDMA1_CH1, GPDMA1_CH2, GPDMA1_CH12, I2C1, USB_OTG_HS};
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usb::{self, Driver};
 use embassy_stm32::wdg::IndependentWatchdog;
@@ -184,7 +184,8 @@ async fn main(spawner: Spawner) {
     let presence = PRESENCE.init(Presence::new());
     let memory = USB_MEMORY.init(Memory::new(presence));
     let (device, endpoints) = nirspi_usb::device(driver, serial, info.firmware, memory);
-    let (camera, commands, packets) = LINK.init(Link::new(PACKETS.fill(&PACKETS_TAKEN, Packet::EMPTY))).split();
+    let (camera, commands, packets) =
+        LINK.init(Link::new(PACKETS.fill(&PACKETS_TAKEN, Packet::EMPTY))).split();
     let mailbox = &*MAILBOX.init(DepthMailbox::new());
     let bus = I2c::new(
         p.I2C1,

@@ -47,7 +47,8 @@ macro_rules! uncleared {
     ($name:ident: [$type:ty; $length:expr], $taken:ident) => {
         #[expect(unsafe_code, reason = "a section is chosen by an attribute that is unsafe to use")]
         #[unsafe(link_section = concat!(".uninit.", stringify!($name)))]
-        static $name: $crate::memory::Uncleared<$type, { $length }> = $crate::memory::Uncleared::new();
+        static $name: $crate::memory::Uncleared<$type, { $length }> =
+            $crate::memory::Uncleared::new();
         static $taken: core::sync::atomic::AtomicBool = core::sync::atomic::AtomicBool::new(false);
     };
 }
