@@ -69,11 +69,7 @@ fn say(report: &Report) -> Result<()> {
             at.picture_snr
         ))?;
     }
-    if let Some(refused) = &report.eye_safety_refused {
-        return print::line(format_args!("eyes: refused: {refused}"));
-    }
-    report
-        .eye_safety
-        .iter()
-        .try_for_each(|light| print::line(format_args!("eyes: {light} (more: nirspi safety)")))
+    let eyes = report.eye_safety.map(|light| format!("{light} (more: nirspi safety)"));
+    let refused = || report.eye_safety_refused.as_ref().map(|why| format!("refused: {why}"));
+    eyes.or_else(refused).iter().try_for_each(|eyes| print::line(format_args!("eyes: {eyes}")))
 }
