@@ -24,6 +24,7 @@ steps=(
     "tcp             two processes over TCP, and boards/hil.sh; demo"
     "recordings      other programs read recordings and exported files; demo, PyPI"
     "emulation       the firmware's budgets, its machine code against the virtual camera and under faults; QEMU, firmware"
+    "silicon         the released ELF of the reference board on a model of its chip; PyPI, firmware"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
     "mutations       deliberate faults in the RTL are seen"
@@ -201,6 +202,8 @@ step_deb() {
 # The folder that `nirspi update` takes, from firmware and bitstream as they were built here.
 step_release_folder() {
     step_firmware
+    # The ELF that is released is the one that has run.
+    if [ -f target/silicon.sha256 ]; then sha256sum --check target/silicon.sha256; fi
     [ -f target/gateware/ecp5-evn/nirspi.bit ] || step_seeds
     cargo run --locked -p nirspi --no-default-features --example release_folder -- target/package/firmware
     ls -l target/package/firmware
@@ -217,10 +220,27 @@ step_emulation() {
     cargo test --locked --test budgets --test qemu --test faults -- --nocapture
 }
 
+# Unicorn is under the GPL: a tool like QEMU, loaded by these tests alone. The ELF under test is the one that is released;
+# `release-folder` compares its hash.
+step_silicon() {
+    local board=nucleo-u5a5zj-q
+    python_with silicon unicorn==2.1.4
+    NIRSPI_UNICORN=$(find "$PWD/target/silicon" -name 'libunicorn*.so.2' -o -name 'libunicorn.2.dylib' | head -1)
+    export NIRSPI_UNICORN
+    FEATURES=parallel bash boards/build.sh "$board"
+    mkdir -p boards/target/silicon
+    cp "$(elf "$board")" boards/target/silicon/parallel
+    bash boards/build.sh "$board"
+    sha256sum "$(elf "$board")" | tee target/silicon.sha256
+    cargo build --locked --release
+    cargo test --locked -p nirspi-tests-silicon --lib -- --nocapture 2>&1 | tee target/silicon.log
+    if grep '^skipped: ' target/silicon.log; then return 1; fi
+}
+
 step_application() {
     local host
     host=$(rustc -vV | sed -n 's/^host: //p')
-    (cd boards && RUSTUP_TOOLCHAIN=$toolchain cargo test --locked -p nirspi-app -p nirspi-usb --target "$host")
+    (cd boards && RUSTUP_TOOLCHAIN=$toolchain cargo test --locked -p nirspi-app -p nirspi-usb -p nirspi-otg-core --target "$host")
     bash boards/otg/check.sh
 }
 

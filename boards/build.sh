@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds the firmware of every board, or of those that are named, into boards/target:
 #   bash boards/build.sh [NAME...]
+# FEATURES=parallel builds with that feature, into the same place.
 # `cargo test --test budgets` then prints the sizes. Uses rustup's targets where rustup can get them. Elsewhere (Debian and
 # Ubuntu, no network but the package mirror) it uses Debian's compiler and the sources of its library, unpacked into
 # boards/target, nothing installed. NIRSPI_FALLBACK=1 always uses Debian's compiler.
@@ -52,9 +53,8 @@ WRAPPER
 if [ -n "${NIRSPI_FALLBACK:-}" ] || ! rustup target add "${targets[@]}" >&2; then
     fall_back
 fi
-# The same bytes wherever sources and registry lie: the place of a panic is a path.
-CARGO_ENCODED_RUSTFLAGS=--remap-path-prefix=$(cd .. && pwd)=/nirspi$'\x1f'--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=/cargo
+CARGO_ENCODED_RUSTFLAGS=$(same_bytes)
 export CARGO_ENCODED_RUSTFLAGS
 for name in "${names[@]}"; do
-    (cd "$name" && cargo build --locked --release --target-dir ../target "${extra[@]}")
+    (cd "$name" && cargo build --locked --release --target-dir ../target ${FEATURES:+--features "$FEATURES"} "${extra[@]}")
 done

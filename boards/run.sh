@@ -12,4 +12,7 @@ name=$1
 shift
 fact "$name" target >/dev/null
 cd "$boards_folder/$name"
+# As build.sh builds it, so that neither compiles again what the other has.
+CARGO_ENCODED_RUSTFLAGS=$(same_bytes)
+export CARGO_ENCODED_RUSTFLAGS
 exec cargo run --locked --release --bin "$name" --target-dir ../target "$@"

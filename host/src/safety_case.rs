@@ -8,7 +8,7 @@ mod faults;
 
 use nirspi_optics::CameraModel;
 use nirspi_optics::safety::{
-    EyeSafety, eye_limit_w_per_m2, longest_for_eyes_s, longest_for_skin_s,
+    EyeSafety, OutsideTheLimits, eye_limit_w_per_m2, longest_for_eyes_s, longest_for_skin_s,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -60,10 +60,13 @@ pub struct SafetyCase {
 
 impl SafetyCase {
     /// The safety case of this camera.
-    #[must_use]
-    pub fn of(camera: &CameraModel) -> Self {
-        let exposures = [Lit::Half, Lit::All].into_iter().flat_map(|lit| {
-            let light = EyeSafety::with_lit(camera, lit.share());
+    ///
+    /// # Errors
+    /// [`OutsideTheLimits`], for a wavelength whose limits are not implemented.
+    pub fn of(camera: &CameraModel) -> Result<Self, OutsideTheLimits> {
+        let of_share = |lit: Lit| Ok((lit, EyeSafety::with_lit(camera, lit.share())?));
+        let lights = [of_share(Lit::Half)?, of_share(Lit::All)?];
+        let exposures = lights.into_iter().flat_map(|(lit, light)| {
             [
                 ("at the lens", light.at_lens_w_per_m2),
                 ("0.2 m before the lens", light.at_200_mm_w_per_m2),
@@ -79,20 +82,20 @@ impl SafetyCase {
             })
         });
         let faults = FAULTS.iter().map(|&fault| {
-            let at_lens = EyeSafety::with_lit(camera, fault.lit.share()).at_lens_w_per_m2;
-            Consequence {
+            let at_lens = EyeSafety::with_lit(camera, fault.lit.share())?.at_lens_w_per_m2;
+            Ok(Consequence {
                 fault,
                 at_lens_w_per_m2: at_lens,
                 share_of_limit: fault.dark_after.seconds().map(|s| at_lens / eye_limit_w_per_m2(s)),
                 longest_for_eyes_s: longest_for_eyes_s(at_lens),
-            }
+            })
         });
-        Self {
+        Ok(Self {
             simulated: true,
             camera: camera.name.clone(),
             exposures: exposures.collect(),
-            faults: faults.collect(),
-        }
+            faults: faults.collect::<Result<_, _>>()?,
+        })
     }
 
     /// The exposures as a table in Markdown.
@@ -155,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_fault_that_is_ended_soon_uses_little_of_the_limit_and_one_that_is_not_has_a_time() {
-        let case = SafetyCase::of(CameraModel::paper());
+        let case = SafetyCase::of(CameraModel::paper()).unwrap();
         for found in &case.faults {
             match found.share_of_limit {
                 // The longest that a barrier takes is 5 s.

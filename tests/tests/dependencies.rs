@@ -167,10 +167,12 @@ fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest()
     let name = |package: &Value| package["name"].as_str().unwrap().to_owned();
     let (default, left_out): (Vec<&Value>, Vec<&Value>) =
         packages.iter().partition(|package| default.contains(&&package["id"]));
-    // The program for browsers has its own step, and a list of features has nothing to test.
-    let (apart, left_out): (Vec<&Value>, Vec<&Value>) = left_out
-        .into_iter()
-        .partition(|package| matches!(&*name(package), "nirspi-web" | "nirspi-tests-features"));
+    // The program for browsers and the ELF on a model of its chip have steps of their own, and a list of features has
+    // nothing to test.
+    let (apart, left_out): (Vec<&Value>, Vec<&Value>) = left_out.into_iter().partition(|package| {
+        let apart = ["nirspi-web", "nirspi-tests-features", "nirspi-tests-silicon"];
+        apart.contains(&&*name(package))
+    });
     let uses_simulator = |package: &&Value| {
         let mut used = package["dependencies"].as_array().unwrap().iter().map(name);
         name(package) == "nirspi-hdl-sim" || used.any(|used| used == "nirspi-hdl-sim")
@@ -184,7 +186,15 @@ fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest()
     let packages: String =
         left_out.iter().map(|package| format!(" -p {}", name(package))).collect();
     let steps = std::fs::read_to_string(root().join(".ci/steps.sh")).unwrap();
-    assert_eq!(apart.len(), 2, "the program for browsers and the list of features are left out");
+    assert_eq!(
+        apart.len(),
+        3,
+        "left out: the program for browsers, the list of features, the model of the chip"
+    );
+    assert!(
+        steps.contains("-p nirspi-tests-silicon"),
+        ".ci/steps.sh does not run the ELF on a model of its chip"
+    );
     assert!(steps.contains("bash host/web/build.sh"), ".ci/steps.sh builds no page for browsers");
     for command in ["cargo test --locked".to_owned(), format!("cargo test --locked{packages}")] {
         let runs =

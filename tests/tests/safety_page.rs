@@ -24,7 +24,7 @@ fn the_tables_of_the_page_are_those_of_the_command() {
     let page = std::fs::read_to_string(&path).unwrap();
     let mut made = page.clone();
     for name in ["paper", "one-metre"] {
-        let case = SafetyCase::of(&CameraModel::named(name).unwrap());
+        let case = SafetyCase::of(&CameraModel::named(name).unwrap()).unwrap();
         made = with_block(&made, &format!("light of {name}"), &case.exposure_table());
         if name == "paper" {
             made = with_block(&made, "single faults", &case.fault_table());

@@ -9,8 +9,8 @@ use embassy_stm32::time::Hertz;
 use nirspi_mcu::BusError;
 use nirspi_mcu::ecp5::SlaveSpi;
 
-/// Longest bitstream that a host may load: the free memory. The project's bitstream has 391 750
-/// bytes (`hdl/build.py`, seed 1).
+/// Longest bitstream that a host may load: the free memory. The project's bitstream has 447 914
+/// bytes (`hdl/build.py`, seed 1) and does not fit: README.md, gateware.
 pub const STAGING_BYTES: usize = 392 << 10;
 
 /// Mode 0, most significant bit first. The chip accepts 60 MHz; loose wires need less.

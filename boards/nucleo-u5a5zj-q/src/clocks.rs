@@ -34,7 +34,9 @@ pub fn config() -> Config {
 /// LSI / 4, 0.5 s. A crystal that does not start or a supply that stays low restarts the chip, and
 /// the LEDs' enable is low meanwhile.
 pub fn start_watchdog() {
-    use embassy_stm32::pac::{IWDG, iwdg::vals::Key};
+    use embassy_stm32::pac::{DBGMCU, IWDG, iwdg::vals::Key};
+    // A debugger that stops the processor stops the watchdog too; the FPGA's own ends a run then.
+    DBGMCU.apb1lfzr().modify(|freeze| freeze.set_dbg_iwdg_stop(true));
     IWDG.kr().write(|key| key.set_key(Key::START));
 }
 

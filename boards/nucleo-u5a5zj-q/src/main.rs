@@ -26,7 +26,7 @@ use embassy_stm32::exti::{self, ExtiInput};
 use embassy_stm32::gpio::{Input, Level, Output, OutputOpenDrain, Pull, Speed};
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::ospi::Ospi;
-use embassy_stm32::peripherals::{GPDMA1_CH0, GPDMA1_CH1, GPDMA1_CH2, I2C1, USB_OTG_HS};
+use embassy_stm32::peripherals::{GPDMA1_CH1, GPDMA1_CH2, GPDMA1_CH12, I2C1, USB_OTG_HS};
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usb::{self, Driver};
 use embassy_stm32::wdg::IndependentWatchdog;
@@ -36,7 +36,7 @@ use fpga::Fpga;
 use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
 use nirspi_mcu::{HostPort, Limits};
-use nirspi_nucleo::{crash, gateware, restart};
+use nirspi_nucleo::{crash, gateware, restart, uncleared};
 use nirspi_usb::{Endpoints, Memory, OutBuffer, PACKET_BYTES, Presence, serve};
 use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
@@ -46,7 +46,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 
 bind_interrupts!(struct Interrupts {
     OTG_HS => usb::InterruptHandler<USB_OTG_HS>;
-    GPDMA1_CHANNEL0 => dma::InterruptHandler<GPDMA1_CH0>;
+    GPDMA1_CHANNEL12 => dma::InterruptHandler<GPDMA1_CH12>;
     GPDMA1_CHANNEL1 => dma::InterruptHandler<GPDMA1_CH1>;
     GPDMA1_CHANNEL2 => dma::InterruptHandler<GPDMA1_CH2>;
     I2C1_EV => i2c::EventInterruptHandler<I2C1>;
@@ -60,12 +60,12 @@ type UsbDriver = Driver<'static, USB_OTG_HS>;
 /// Number of packets that can wait for the host: 32 full frames.
 const PLACES: usize = 32;
 
-static PACKETS: ConstStaticCell<[Packet; PLACES]> = ConstStaticCell::new([Packet::EMPTY; PLACES]);
+uncleared! { PACKETS: [Packet; PLACES], PACKETS_TAKEN }
 static LINK: StaticCell<Link<'static>> = StaticCell::new();
 static MAILBOX: StaticCell<DepthMailbox> = StaticCell::new();
 static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
 static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
-static STAGING: ConstStaticCell<[u8; configuration::STAGING_BYTES]> = ConstStaticCell::new([0; _]);
+uncleared! { STAGING: [u8; configuration::STAGING_BYTES], STAGING_TAKEN }
 static PRESENCE: StaticCell<Presence> = StaticCell::new();
 static USB_MEMORY: StaticCell<Memory> = StaticCell::new();
 static USB_BUFFER: ConstStaticCell<OutBuffer> = ConstStaticCell::new(OutBuffer::new());
@@ -129,7 +129,7 @@ async fn main(spawner: Spawner) {
             pins.fpga_io2,
             pins.fpga_io3,
             pins.fpga_cs_n,
-            p.GPDMA1_CH0,
+            p.GPDMA1_CH12,
             Interrupts,
             fpga::config(),
         ),
@@ -184,7 +184,8 @@ async fn main(spawner: Spawner) {
     let presence = PRESENCE.init(Presence::new());
     let memory = USB_MEMORY.init(Memory::new(presence));
     let (device, endpoints) = nirspi_usb::device(driver, serial, info.firmware, memory);
-    let (camera, commands, packets) = LINK.init(Link::new(PACKETS.take())).split();
+    let (camera, commands, packets) =
+        LINK.init(Link::new(PACKETS.fill(&PACKETS_TAKEN, Packet::EMPTY))).split();
     let mailbox = &*MAILBOX.init(DepthMailbox::new());
     let bus = I2c::new(
         p.I2C1,
@@ -205,7 +206,7 @@ async fn main(spawner: Spawner) {
         port,
         frame: FRAME.take(),
         spare: Some(SPARE.take()),
-        loader: gateware::Loader::new(configuration, STAGING.take()),
+        loader: gateware::Loader::new(configuration, STAGING.fill(&STAGING_TAKEN, 0)),
         info,
         limits: Limits::default(),
         crash: nirspi_app::crash::take(),

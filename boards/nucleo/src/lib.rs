@@ -6,6 +6,7 @@
 
 pub mod crash;
 pub mod gateware;
+pub mod memory;
 pub mod port;
 pub mod restart;
 

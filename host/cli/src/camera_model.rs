@@ -69,5 +69,7 @@ fn say(report: &Report) -> Result<()> {
             at.picture_snr
         ))?;
     }
-    print::line(format_args!("eyes: {} (more: nirspi safety)", report.eye_safety))
+    let eyes = report.eye_safety.map(|light| format!("{light} (more: nirspi safety)"));
+    let refused = || report.eye_safety_refused.as_ref().map(|why| format!("refused: {why}"));
+    eyes.or_else(refused).iter().try_for_each(|eyes| print::line(format_args!("eyes: {eyes}")))
 }

@@ -2,7 +2,7 @@
 
 use super::print;
 use super::report::ReportArgs;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use nirspi::safety_case::SafetyCase;
 use nirspi::virtual_camera::read_camera_model;
 use std::process::ExitCode;
@@ -24,7 +24,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let case = SafetyCase::of(&read_camera_model(&args.camera_model)?);
+    let case = SafetyCase::of(&read_camera_model(&args.camera_model)?)
+        .with_context(|| args.camera_model.clone())?;
     args.report.print_answer(&case, |case| {
         print::line(format_args!("camera {} (computed, not measured)\n", case.camera))?;
         print::line(case.exposure_table())?;

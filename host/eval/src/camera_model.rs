@@ -36,8 +36,10 @@ pub struct Report {
     pub gain_bandwidth_ghz: f64,
     /// The camera at some distances.
     pub distances: Vec<AtDistance>,
-    /// The light at an eye in front of the camera.
-    pub eye_safety: EyeSafety,
+    /// The light at an eye in front of the camera; `null` for a wavelength whose limits are not implemented.
+    pub eye_safety: Option<EyeSafety>,
+    /// Why there is no `eye_safety`.
+    pub eye_safety_refused: Option<String>,
 }
 
 /// The camera at one distance.
@@ -73,6 +75,10 @@ pub fn camera_model(camera: &CameraModel) -> Result<Report> {
     let dry = Weather::new(Drops::none(), camera.wavelength_nm, Water::Segelstein)?;
     let sweep_us = 2.0 * LEDS as f64 * pattern_us(camera);
     let sweeps = camera.readout.sweeps_per_picture;
+    let (eye_safety, eye_safety_refused) = match EyeSafety::of(camera) {
+        Ok(light) => (Some(light), None),
+        Err(outside) => (None, Some(outside.to_string())),
+    };
     Ok(Report {
         simulated: true,
         camera: camera.name.clone(),
@@ -83,7 +89,8 @@ pub fn camera_model(camera: &CameraModel) -> Result<Report> {
         amplifier_noise_pa_per_sqrt_hz: camera.amplifier_noise_pa_per_sqrt_hz(),
         gain_bandwidth_ghz: camera.gain_bandwidth_ghz(),
         distances: distances.iter().map(|&m| at(camera, &dry, m)).collect::<Result<_>>()?,
-        eye_safety: EyeSafety::of(camera),
+        eye_safety,
+        eye_safety_refused,
     })
 }
 

@@ -9,8 +9,11 @@
 //! | cornea and lens | 780 to 3000 nm | 1000 s and longer | 100 |
 //! | skin | 380 nm to 1 mm | below 10 s | `20 000 t^-0.75` |
 //!
-//! For skin and longer exposures there is no limit: pain comes before damage. The retina gets
-//! nothing at 1550 nm, because the water of the eye absorbs it.
+//! For skin and longer exposures there is no limit: pain comes before damage.
+//!
+//! From 1400 nm on the retina gets nothing, because the water of the eye absorbs the light. Below 1400 nm the retina has
+//! limits of its own (thermal; blue light below 700 nm), which depend on radiance and on the size of the source. These are
+//! not implemented, so a camera of such a wavelength is refused: [`OutsideTheLimits`].
 //!
 //! The result is computed from a description, and is neither a measurement nor a certificate.
 
@@ -18,6 +21,7 @@ use crate::{CameraModel, LEDS, SIDE};
 use serde::Serialize;
 use std::f64::consts::{FRAC_PI_4, PI};
 use std::fmt::{self, Display};
+use thiserror::Error;
 
 /// Allowed irradiance of the eye for 1000 s and longer, in W/m^2.
 pub const LONG_EXPOSURE_LIMIT_W_PER_M2: f64 = 100.0;
@@ -28,6 +32,21 @@ const EYE: f64 = 18_000.0;
 const SKIN: f64 = 20_000.0;
 /// Longest exposure for which the skin has a limit, in s.
 const SKIN_LONGEST_S: f64 = 10.0;
+
+/// Shortest and longest wavelength of the limits above that leave out no part of the eye, in nm.
+pub const WAVELENGTHS_NM: std::ops::RangeInclusive<f64> = 1400.0..=3000.0;
+
+/// A wavelength whose limits are not implemented.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error(
+    "no eye limits for a wavelength of {wavelength_nm} nm, expected {first} to {last}: below {first} nm light reaches the \
+     retina, and nirspi does not have the retina's limits (thermal and blue light, ICNIRP 2013). Ask a laser safety officer",
+    first = WAVELENGTHS_NM.start(), last = WAVELENGTHS_NM.end()
+)]
+pub struct OutsideTheLimits {
+    /// The camera's wavelength.
+    pub wavelength_nm: f64,
+}
 
 /// Distance at which IEC 62471 assesses a lamp, in mm.
 const JUDGED_AT_MM: f64 = 200.0;
@@ -77,14 +96,22 @@ pub struct EyeSafety {
 
 impl EyeSafety {
     /// The light of this camera, averaged over a sweep: half of the LEDs are lit.
-    #[must_use]
-    pub fn of(camera: &CameraModel) -> Self {
+    ///
+    /// # Errors
+    /// [`OutsideTheLimits`].
+    pub fn of(camera: &CameraModel) -> Result<Self, OutsideTheLimits> {
         Self::with_lit(camera, LIT_SHARE)
     }
 
     /// The light of this camera with this share of its LEDs lit, 0 to 1.
-    #[must_use]
-    pub fn with_lit(camera: &CameraModel, lit_share: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`OutsideTheLimits`].
+    pub fn with_lit(camera: &CameraModel, lit_share: f64) -> Result<Self, OutsideTheLimits> {
+        let wavelength_nm = camera.wavelength_nm;
+        if !WAVELENGTHS_NM.contains(&wavelength_nm) {
+            return Err(OutsideTheLimits { wavelength_nm });
+        }
         let (settings, lens) = (camera.budget_settings(), camera.projector());
         let array_mw = LEDS as f64 * lit_share * settings.led_power_mw;
         let through_lens_mw = array_mw * settings.projected_fraction(&lens);
@@ -100,7 +127,7 @@ impl EyeSafety {
         // (m + 1) / (2 pi) of its power a steradian, as if all LEDs were in one place. A narrow
         // beam is no brighter than at the array's surface.
         let on_axis_mw_per_sr = array_mw * (settings.led_exponent() + 1.0) / (2.0 * PI);
-        Self {
+        Ok(Self {
             through_lens_mw,
             at_lens_w_per_m2,
             at_200_mm_w_per_m2,
@@ -110,7 +137,7 @@ impl EyeSafety {
                 .min(at_array_w_per_m2),
             limit_w_per_m2: LONG_EXPOSURE_LIMIT_W_PER_M2,
             longest_at_lens_s: longest_for_eyes_s(at_lens_w_per_m2),
-        }
+        })
     }
 
     /// Whether an eye may stay at the lens without a time limit.
@@ -148,7 +175,7 @@ mod tests {
     fn the_papers_camera_is_above_the_limit_at_the_lens_and_below_it_at_200_mm() {
         // By hand: 512 * 4 mW * 2.51 % = 51.4 mW; over pi/4 (20 mm)^2 163 W/m^2, over (32 mm)^2 50
         // W/m^2.
-        let paper = EyeSafety::of(CameraModel::paper());
+        let paper = EyeSafety::of(CameraModel::paper()).unwrap();
         assert!((paper.at_lens_w_per_m2 / 163.4 - 1.0).abs() < 0.01, "{paper:?}");
         assert!((paper.at_200_mm_w_per_m2 / 50.1 - 1.0).abs() < 0.01, "{paper:?}");
         assert!(!paper.is_within_the_limit());
@@ -158,7 +185,7 @@ mod tests {
 
     #[test]
     fn the_one_metre_camera_is_within_the_limit_everywhere() {
-        let safety = EyeSafety::of(&CameraModel::named("one-metre").unwrap());
+        let safety = EyeSafety::of(&CameraModel::named("one-metre").unwrap()).unwrap();
         assert!(safety.is_within_the_limit(), "{safety:?}");
         assert_eq!(safety.longest_at_lens_s, None);
     }
@@ -183,14 +210,26 @@ mod tests {
     fn the_bare_array_is_as_bright_as_by_hand() {
         // 1024 * 4 mW over (32 * 3 mm)^2. A beam of 5 degrees is 35 mm wide at 0.2 m, less than the
         // array: it is as bright there as at the surface.
-        let all = EyeSafety::with_lit(CameraModel::paper(), 1.0);
+        let all = EyeSafety::with_lit(CameraModel::paper(), 1.0).unwrap();
         assert!((all.at_array_w_per_m2 / 444.4 - 1.0).abs() < 1e-3, "{all:?}");
         assert_eq!(all.before_array_w_per_m2, all.at_array_w_per_m2);
-        let half = EyeSafety::of(CameraModel::paper());
+        let half = EyeSafety::of(CameraModel::paper()).unwrap();
         assert!((all.at_lens_w_per_m2 / half.at_lens_w_per_m2 - 2.0).abs() < 1e-12);
         // 60 degrees are an intensity like the cosine: P / pi a steradian, 4.096 W over 0.04 m^2.
-        let chips = EyeSafety::with_lit(&CameraModel::named("one-metre").unwrap(), 1.0);
+        let chips = EyeSafety::with_lit(&CameraModel::named("one-metre").unwrap(), 1.0).unwrap();
         assert!((chips.before_array_w_per_m2 / 32.6 - 1.0).abs() < 1e-3, "{chips:?}");
         assert!((chips.at_array_w_per_m2 / 28_444.0 - 1.0).abs() < 1e-3, "{chips:?}");
+    }
+
+    #[test]
+    fn a_wavelength_that_reaches_the_retina_is_refused() {
+        for wavelength_nm in [450.0, 550.0, 850.0, 940.0, 1399.9] {
+            let camera = CameraModel { wavelength_nm, ..CameraModel::paper().clone() };
+            assert_eq!(EyeSafety::of(&camera), Err(OutsideTheLimits { wavelength_nm }));
+        }
+        for wavelength_nm in [1400.0, 1550.0, 1700.0] {
+            let camera = CameraModel { wavelength_nm, ..CameraModel::paper().clone() };
+            assert!(EyeSafety::of(&camera).is_ok(), "{wavelength_nm}");
+        }
     }
 }

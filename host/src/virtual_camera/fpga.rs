@@ -131,6 +131,13 @@ impl OpticalFpga {
         }
     }
 
+    /// The next packet that the FPGA's parallel port sends, which then counts as sent.
+    pub fn parallel_packet(&mut self) -> Option<Vec<u8>> {
+        let packet = self.first.gateware.outgoing()?;
+        self.first.gateware.sent();
+        Some(packet)
+    }
+
     fn all(&mut self) -> impl Iterator<Item = &mut Detector> {
         std::iter::once(&mut self.first).chain(&mut self.further)
     }

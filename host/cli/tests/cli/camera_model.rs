@@ -80,6 +80,18 @@ fn the_one_metre_camera_shows_a_letter_at_one_metre_in_heavy_rain() {
 }
 
 #[test]
+fn a_wavelength_that_reaches_the_retina_gets_no_statement_about_eyes() {
+    let bench = Bench::new();
+    let description = "wavelength_nm = 850.0\n\n[detector]\nresponsivity_a_per_w = 0.5\n";
+    std::fs::write(bench.path("cheap.toml"), description).unwrap();
+    bench.run(&["safety", "cheap.toml"]).failed(1, &["cheap.toml", "850 nm", "retina"]);
+    let said = bench.run(&["camera-model", "cheap.toml"]).succeeded().stdout;
+    assert!(said.contains("eyes: refused: no eye limits for a wavelength of 850 nm"), "{said}");
+    let light = bench.run(&["camera-model", "cheap.toml", "--json"]).succeeded().json();
+    assert!(light["eye_safety"].is_null() && light["eye_safety_refused"].is_string(), "{light}");
+}
+
+#[test]
 fn resolution_and_snr_against_distance_are_drawn() {
     let bench = Bench::new();
     let range = ["range", "--camera-model", "one-metre", "--out", "range"];

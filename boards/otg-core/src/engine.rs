@@ -17,7 +17,6 @@
 //!   never. A FIFO is emptied when the DMA rests.
 
 use super::*;
-use embassy_usb_synopsys_otg::simulated;
 
 const DMAEN: u32 = 1 << 5;
 const AHBIDL: u32 = 1 << 31;
@@ -45,6 +44,7 @@ pub struct Engine {
 }
 
 impl OtgCore {
+    /// Whether the driver has chosen DMA.
     pub fn uses_dma(&self) -> bool {
         self.plain(GAHBCFG) & DMAEN != 0
     }
@@ -151,12 +151,12 @@ impl OtgCore {
             return;
         }
         let address = side.address;
-        let read = if bytes == 0 { Some(Vec::new()) } else { simulated::fetch(address, bytes) };
+        let read = if bytes == 0 { Some(Vec::new()) } else { self.memory.fetch(address, bytes) };
         let packet = read.unwrap_or_else(|| {
             self.violation(format!(
                 "{bytes} bytes read at {address:#x}, which the driver has not lent"
             ));
-            std::vec![0; bytes]
+            vec![0; bytes]
         });
         let side = &mut self.ins[index];
         side.fifo.extend(words(&packet));
@@ -197,7 +197,7 @@ impl OtgCore {
                 } else {
                     out.size -= 1 << 19 | length;
                 }
-                if length > 0 && !simulated::store(address, &bytes[..length as usize]) {
+                if length > 0 && !self.memory.store(address, &bytes[..length as usize]) {
                     self.violation(format!(
                         "{length} bytes written at {address:#x}, which was not lent"
                     ));

@@ -1,0 +1,143 @@
+//! Crash, restart, boot loader, supply, gateware.
+
+use super::*;
+use crate::machine::Stop;
+use nirspi_tests::tapped::{Tapped, measure};
+use nirspi_wire::{Fault, RebootInto, State};
+
+/// No memory is there.
+const NOWHERE: u32 = 0x6000_0000;
+
+/// A crash is dark after a few instructions, before the record is written.
+pub const AT_ONCE_US: f64 = 10.0;
+
+/// Crashes a camera that is lit; returns the time until it is dark.
+pub fn dark_after_a_crash_us(camera: &Camera) -> f64 {
+    camera.with(|machine| {
+        let before = machine.now_us();
+        machine.derail(NOWHERE);
+        machine.run_while(1_000.0, |chip| !chip.is_lit());
+        let (fell, lit) = machine.chip(|chip| chip.light_log.last().copied()).unwrap();
+        assert!(!lit);
+        fell as f64 / 1e6 - before
+    })
+}
+
+#[test]
+fn a_crash_while_lit_is_dark_at_once_and_the_next_host_is_told_of_it_once() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &natural());
+    pass(&camera, 2.0);
+    assert!(is_lit(&camera));
+    let dark_us = dark_after_a_crash_us(&camera);
+    assert!(dark_us < AT_ONCE_US, "{dark_us} us");
+    drop(session);
+    pass(&camera, 5.0);
+    camera.connect();
+    let hear = || {
+        let mut tapped = Tapped::new(camera.link());
+        let mut session = Session::open(tapped.link()).unwrap();
+        session.status(&mut IgnorePackets).unwrap();
+        assert!(measure(&mut session, &natural(), 1).counters.is_complete(), "it measures again");
+        tapped.crashes()
+    };
+    let told = hear();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("fault at 0x60000000"), "{told:?}");
+    assert!(hear().is_empty());
+    assert_eq!(camera.with(|machine| machine.resets.len()), 1);
+    camera.assert_no_violation();
+}
+
+#[test]
+fn the_boot_loader_is_entered_as_after_a_reset() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &natural());
+    session.command(request::Reboot(RebootInto::Bootloader), &mut IgnorePackets).unwrap();
+    let stop = camera.with(|machine| {
+        loop {
+            match machine.run_us(1e6) {
+                Stop::Reset(_) => {}
+                stop => return stop,
+            }
+        }
+    });
+    // The boot loader's stack is where its vector table says, below the firmware's limit.
+    assert_eq!(stop, Stop::BootLoader { stack: 0x2000_5000, vectors: 0x0BF9_0000 });
+    assert!(!is_lit(&camera));
+    camera.assert_no_violation();
+}
+
+#[test]
+fn a_restart_that_the_host_asks_for_is_back_on_the_bus() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    session.command(request::Reboot(RebootInto::Application), &mut IgnorePackets).unwrap();
+    drop(session);
+    assert!(camera.with(|machine| machine.run_while(1e6, |chip| !chip.usb.is_configured())));
+    camera.connect();
+    let mut session = Session::open(camera.link()).unwrap();
+    assert!(measure(&mut session, &natural(), 2).counters.is_complete());
+    camera.assert_no_violation();
+}
+
+#[test]
+fn a_supply_that_sags_while_lit_is_dark_at_once_and_stays_dark() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &natural());
+    pass(&camera, 2.0);
+    assert!(is_lit(&camera));
+    camera.with(|machine| machine.chip(|chip| chip.supply_millivolts = 2_700));
+    pass(&camera, 2.0);
+    assert!(!is_lit(&camera));
+    // It waits for the supply, and the watchdog restarts it again and again.
+    pass(&camera, 3_000.0);
+    let (resets, lit) =
+        camera.with(|machine| (machine.resets.len(), machine.chip(|chip| chip.is_lit())));
+    assert!(resets >= 3 && !lit, "{resets} starts");
+    camera.with(|machine| machine.chip(|chip| chip.supply_millivolts = 3_300));
+    camera.with(|machine| machine.run_while(1e6, |chip| !chip.usb.is_configured()));
+    camera.connect();
+    let mut session = Session::open(camera.link()).unwrap();
+    assert!(measure(&mut session, &natural(), 2).counters.is_complete());
+    camera.assert_no_violation();
+}
+
+#[test]
+fn an_interlock_that_opens_ends_the_light_within_two_milliseconds() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &natural());
+    pass(&camera, 2.0);
+    assert!(is_lit(&camera));
+    camera.with(|machine| machine.chip(|chip| chip.drive_named("interlock", false)));
+    pass(&camera, 2.0);
+    assert!(!is_lit(&camera));
+    assert_eq!(session.status(&mut IgnorePackets).unwrap().fault, Some(Fault::Interlock));
+    camera.assert_no_violation();
+}
+
+#[test]
+fn gateware_from_the_host_reaches_the_fpga_over_spi1_byte_for_byte() {
+    let Some(camera) = connected_as(even()) else { return };
+    // Begins as ecppack's files do; of no design.
+    let mut bitstream = vec![0xFF, 0x00, b'n', 0x00, 0xFF, 0xFF, 0xFF, 0xBD, 0xB3];
+    bitstream.extend((0..40_000_u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8));
+    let mut session = Session::open(camera.link()).unwrap();
+    nirspi::gateware::load(&mut session, &bitstream, &mut |_| {}).unwrap_or_else(|error| {
+        panic!(
+            "{error}; {:x?}",
+            camera.with(|machine| (machine.resets.clone(), machine.violations()))
+        )
+    });
+    let (came, bytes) = camera
+        .with(|machine| machine.chip(|chip| (chip.fpga_configuration.bitstream(), chip.spi.bytes)));
+    println!("{bytes} bytes over SPI1");
+    assert!(came == bitstream, "{} of {} bytes", came.len(), bitstream.len());
+    assert_eq!(session.status(&mut IgnorePackets).unwrap().state, State::Idle);
+    assert!(measure(&mut session, &natural(), 2).counters.is_complete());
+    camera.assert_no_violation();
+}

@@ -1,0 +1,93 @@
+//! From power-up to a host that has the camera.
+
+use super::*;
+use crate::camera::{BOARD, elf};
+use crate::chip::OnTheBus;
+use crate::chip::Ready;
+use crate::machine::Stop;
+use nirspi_wire::State;
+
+#[test]
+fn it_boots_and_a_host_enumerates_it_at_high_speed() {
+    let Some(camera) = connected_as(even()) else { return };
+    let (us, pins) =
+        camera.with(|machine| (machine.now_us(), machine.chip(|chip| chip.wrong_pins())));
+    println!("configured by the host after {us:.0} us; {}", elf().display());
+    assert_eq!(pins, Vec::<String>::new(), "pins are as in the board's table");
+    let kinds = camera.with(|machine| {
+        machine.chip(|chip| {
+            let descriptors = chip.usb.cable.descriptors.borrow();
+            descriptors.iter().map(|(kind, bytes)| (*kind, bytes.len())).collect::<Vec<_>>()
+        })
+    });
+    assert_eq!(kinds.iter().map(|(kind, _)| *kind).collect::<Vec<_>>(), [1, 2, 15, 3, 3, 3]);
+    let session = Session::open(camera.link()).unwrap();
+    let identity = session.identity();
+    assert_eq!((identity.board.as_str(), identity.adc_hz), (BOARD, nirspi_wire::ADC_HZ));
+    assert!(!is_lit(&camera));
+    camera.assert_no_violation();
+}
+
+#[test]
+fn the_watchdog_is_fed_in_time_and_the_stack_has_room_from_power_up_on() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    assert!(nirspi_tests::tapped::measure(&mut session, &natural(), 3).counters.is_complete());
+    let (longest_ms, (deepest, limit)) = camera.with(|machine| {
+        (machine.chip(|chip| chip.watchdog.longest_ps as f64 / 1e9), machine.deepest_stack())
+    });
+    println!(
+        "longest time between two feeds {longest_ms:.1} ms of 500; deepest stack {deepest} of {limit} bytes"
+    );
+    // Half of the watchdog's time, and three quarters of the least room that `board.toml` asks for.
+    assert!(longest_ms < 250.0, "{longest_ms} ms");
+    assert!(deepest > 0 && deepest < 65_536 * 3 / 4, "{deepest} bytes");
+    camera.assert_no_violation();
+}
+
+/// Each wait of the start, with what it waits for.
+const WAITS: &[Ready] = &[
+    Ready("PWR.SVMSR", 26),
+    Ready("PWR.SVMSR", 24),
+    Ready("PWR.VOSR", 15),
+    Ready("PWR.VOSR", 14),
+    Ready("PWR.VOSR", 13),
+    Ready("RCC.CR", 17),
+    Ready("RCC.CR", 25),
+    Ready("RCC.CFGR1", 2),
+    Ready("RCC.BDCR", 27),
+    Ready("ADC1.ISR", 31),
+    Ready("ADC1.ISR", 0),
+];
+
+#[test]
+fn a_wait_of_the_start_that_never_ends_is_ended_by_the_watchdog_in_the_dark() {
+    for wait in WAITS {
+        let Some(camera) = Camera::start(Plan { stuck: Some(*wait), ..even() }) else { return };
+        let (stop, lit, violations) = camera.with(|machine| {
+            (machine.run_us(3e6), machine.chip(|chip| chip.light_log.clone()), machine.violations())
+        });
+        let is_ended = matches!(stop, Stop::Reset(_));
+        assert!(is_ended, "{wait:?}: {stop:?}");
+        assert!(lit.is_empty(), "{wait:?}: {lit:?}");
+        assert!(violations.is_empty(), "{wait:?}: {violations:?}");
+    }
+}
+
+#[test]
+fn a_depth_sensor_that_holds_its_bus_holds_up_nothing_else() {
+    let Some(camera) = Camera::start(Plan { on_the_bus: OnTheBus::Stuck, ..even() }) else {
+        return;
+    };
+    camera.connect();
+    let mut session = Session::open(camera.link()).unwrap();
+    assert!(nirspi_tests::tapped::measure(&mut session, &natural(), 3).counters.is_complete());
+    pass(&camera, 3_000.0);
+    assert_eq!(session.status(&mut IgnorePackets).unwrap().state, State::Configured);
+    let (resets, longest_ms) = camera.with(|machine| {
+        (machine.resets.clone(), machine.chip(|chip| chip.watchdog.longest_ps as f64 / 1e9))
+    });
+    assert_eq!(resets, []);
+    assert!(longest_ms < 250.0, "{longest_ms} ms");
+    camera.assert_no_violation();
+}
