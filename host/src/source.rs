@@ -382,7 +382,12 @@ impl Source {
 
 /// The measurements of frames, whose signed values the law of readings holds for.
 fn of_frames(measurements: Measurements) -> Result<Reading, MeasurementError> {
-    law::read(measurements.rows(), measurements.values(), Form::Differences.into())
+    let noise = measurements.noise();
+    let mut read = law::read(measurements.rows(), measurements.values(), Form::Differences.into())?;
+    if let Some(noise) = noise {
+        read.measurements = read.measurements.with_noise(noise)?;
+    }
+    Ok(read)
 }
 
 /// A note that a camera has further detectors.

@@ -6,6 +6,7 @@
 
 use crate::error::{EvalError, Result};
 use crate::shot::{CalibratedCamera, Conditions};
+use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
@@ -117,15 +118,20 @@ pub fn table1(settings: &Settings, done: &dyn Fn()) -> Result<Report> {
         return Err(EvalError::setting("sampling", sampling, "more than 0, at most 1"));
     }
     let setup = MeasurementSetup::new(&Order::ZigZag, sampling)?;
-    let sweeps = (ACQUISITION_NS / setup.frame_ns()).round().max(1.0) as u32;
-    let acquisition_ms = setup.frame_ns() * f64::from(sweeps) * 1e-6;
+    // Frames that are long enough for the port, so that none is lost.
+    let light = Light::from_ms(ACQUISITION_NS * 1e-6);
+    let exposure = light.and_then(|light| Exposure::of(Length::Light(light, None), &setup));
+    let exposure = exposure.map_err(|error| EvalError::Content(error.to_string()))?;
+    let acquisition_ms = exposure.light_ms(&setup);
+    let setup = MeasurementSetup { sweeps: exposure.sweeps, ..setup };
+    let sweeps = exposure.frames * exposure.sweeps;
     let patterns = setup.rows.len();
     let letter = SceneSource::Letter('R').load(256)?;
     let side_mm = letter.side_mm.unwrap_or_else(|| Projector::default().field_mm(DISTANCE_M * 1e3));
     let scene = Scene::new(letter.reflectance, letter.size_px, side_mm)?;
     let optics = VirtualOptics::new(scene, DISTANCE_M * 1e3)?;
     let camera = CalibratedCamera::new(optics.camera_model(), seed)?;
-    let captured = camera.record(&optics, setup, sweeps, seed)?;
+    let captured = camera.record(&optics, setup, exposure.frames, seed)?;
     let air = &Air::dry();
     let conditions = Conditions { distance_m: DISTANCE_M, air, frames: sweeps };
     let white = camera.white_level(conditions, seed)?;

@@ -28,6 +28,10 @@ impl MethodReport {
     #[must_use]
     pub fn doubt(&self, measurements: &Measurements) -> Option<String> {
         let held_back = self.made.held_back.filter(HeldBack::is_by_chance)?;
+        // An even scene, as a white sheet, has nothing to predict.
+        if measurements.noise().is_some_and(|noise| deviation(measurements) < EVEN * noise) {
+            return None;
+        }
         let cause = match explanation(measurements) {
             Some(cause) => format!("they fit {cause}"),
             None => "they are noise, or belong to patterns of another order".to_owned(),
@@ -43,6 +47,20 @@ impl MethodReport {
     pub fn short(&self) -> String {
         self.made.short()
     }
+}
+
+/// Deviation of the readings, in standard deviations of their noise, below which a scene is even.
+const EVEN: f64 = 1.5;
+
+/// Standard deviation of the measurements around 0, without that of the all-ones pattern.
+fn deviation(measurements: &Measurements) -> f64 {
+    let values = measurements.rows().iter().zip(measurements.values());
+    let (mut sum, mut count) = (0.0, 0.0_f64);
+    for (_, value) in values.filter(|(row, _)| **row != 0) {
+        sum += value * value;
+        count += 1.0;
+    }
+    (sum / count.max(1.0)).sqrt()
 }
 
 impl fmt::Display for MethodReport {

@@ -13,6 +13,7 @@ const SHARE: f32 = 0.1;
 
 /// The largest mean of 2 x 2 neighbours among `side` x `side` pixels; 0 for an image without light.
 #[must_use]
+#[cfg(feature = "enhance")]
 pub fn brightest(pixels: &[f32], side: usize) -> f32 {
     let corners =
         (0..side.saturating_sub(1)).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
@@ -52,6 +53,7 @@ mod tests {
     use nirspi_recon::Side;
 
     #[test]
+    #[cfg(feature = "enhance")]
     fn one_bright_pixel_is_not_white_and_four_are() {
         let mut pixels = vec![0.0; 64];
         pixels[9] = 8.0;

@@ -7,7 +7,7 @@ use nirspi::files::image::read_grey;
 use nirspi::imaging::enhance_frames;
 use nirspi::source::{Source, SourceOptions};
 use nirspi::stage_times::StageTimes;
-use nirspi_recon::reconstruct::{Method, MethodSettings};
+use nirspi_recon::reconstruct::Method;
 
 /// Bright LEDs that differ by a fifth, one of them dead, so that the flat field shows.
 const UNEQUAL: &[u8] = b"[leds]\npower_mw = 40\npower_spread = 0.2\ndead = [[3, 7]]\n";
@@ -35,8 +35,9 @@ fn one_recording_gives_one_picture_through_every_door() {
     // The library's functions, as `demo` calls them. The flat field lies where the program kept it.
     let source = Source::read(&bench.path("rec.mcap"), &SourceOptions::default()).unwrap();
     assert!(source.flat_field.is_none(), "a flat field of this user's own");
-    let ready = Method::default().prepare(&MethodSettings::default()).unwrap();
-    let image = ready.reconstruct(&source.measurements).unwrap().image;
+    let ready = Method::default().prepare(&nirspi_nets::prior::settings()).unwrap();
+    let made = ready.reconstruct(&source.measurements).unwrap();
+    let image = made.image;
     let flat = kept(&bench);
     assert_eq!(image.pixels(), bench.pixels("plain/image.npy"));
     let image = FlatField::corrected(Some(&flat), image);
@@ -46,7 +47,10 @@ fn one_recording_gives_one_picture_through_every_door() {
     assert_eq!(sharp, bench.pixels("rec/enhanced.npy"));
 
     // The live page of the recording, once it has summed all frames.
-    let server = serve(&bench, &["--camera", "replay:rec.mcap,100", "--sum", "40"]);
+    // The page chooses by its first picture, of fewer frames.
+    let chosen = made.report.chosen.unwrap();
+    let live = ["--camera", "replay:rec.mcap,100", "--sum", "40", "--method", chosen];
+    let server = serve(&bench, &live);
     server.state("of all frames", |state| state["picture"]["frames"] == 40);
     let answer = server.get("/image.npy");
     bench.write("live.npy", &answer.body);

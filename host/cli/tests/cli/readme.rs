@@ -17,6 +17,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
         "cargo run --release -p nirspi-eval --example",
         "needs data of other groups (docs/data.md)",
     ),
+    ("", "bash .ci/run silicon", "needs the board's ELF and PyPI; .ci/run silicon"),
     ("", "pip install", "needs Python and PyPI; .ci/run python"),
     ("", "bash boards/run.sh", "needs a board, or QEMU; tests/tests/qemu"),
     ("", "sudo ", "changes the machine; tests/cli/versions.rs installs the udev rule in a folder"),

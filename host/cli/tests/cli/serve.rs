@@ -254,7 +254,7 @@ fn pages_switch_method_enhancement_and_number_of_frames() {
     assert_eq!(state["settings"]["frames"], 5);
     let about = state["offered"]["about"].as_array().unwrap();
     assert!(about.iter().all(|line| line.as_str().unwrap().len() > 20), "{about:?}");
-    let every = ["hadamard", "omp", "pseudo-inverse", "tikhonov", "fista", "tv", "prior"];
+    let every = ["hadamard", "omp", "pseudo-inverse", "tikhonov", "fista", "tv", "prior", "auto"];
     assert_eq!(state["offered"]["methods"], serde_json::json!(every));
     // Without a word of the user's, the default of the library's list.
     let default = nirspi_recon::reconstruct::Method::default();

@@ -193,7 +193,10 @@ fn images_that_start_from_those_before_are_switched_on_by_an_option_and_off_by_t
     let past = state["picture"]["past"].as_str().unwrap();
     assert!(past.contains("patterns known, scene moved by"), "{past}");
     assert_eq!(state["picture"]["frames"], 8);
-    assert_eq!(state["offered"]["with_warm_start"], json!(["tikhonov", "fista", "tv", "prior"]));
+    assert_eq!(
+        state["offered"]["with_warm_start"],
+        json!(["tikhonov", "fista", "tv", "prior", "auto"])
+    );
     server.change(r#"{"warm_start": false}"#).json();
     server.state("alone", |state| state["picture"]["past"].is_null());
     server.change(r#"{"warm_start": "yes"}"#).refuses(400, "expected a boolean");

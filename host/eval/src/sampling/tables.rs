@@ -180,10 +180,10 @@ mod tests {
         let text = all(&report, &orders, &methods, &[0.3]);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(
-            lines[4], "| good | 22.00 | tv: 25.00 (+3.00) | omp: 24.00 (+2.00) | |",
+            lines[6], "| good | 22.00 | tv: 25.00 (+3.00) | omp: 24.00 (+2.00) | |",
             "{text}"
         );
-        assert_eq!(lines[5], "| bad | 10.00 | omp: 13.00 (+3.00) | tv: 12.00 (+2.00) | |");
+        assert_eq!(lines[7], "| bad | 10.00 | omp: 13.00 (+3.00) | tv: 12.00 (+2.00) | |");
         assert!(lines.contains(&"| method | bad | good |"), "{text}");
         assert!(lines.contains(&"| tv | 12.00 | **25.00** |"), "{text}");
         assert!(lines.contains(&"As hadamard everywhere, and left out: idle"), "{text}");

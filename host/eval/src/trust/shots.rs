@@ -112,7 +112,9 @@ impl Studio {
             network: Some(nirspi_nets::prior::shipped()),
             ..MethodSettings::default()
         };
-        let methods = Method::ALL.to_vec();
+        // A choice makes the image of one of the others, and takes that one's table.
+        let all = Method::ALL.iter().copied();
+        let methods: Vec<Method> = all.filter(|method| *method != Method::AUTO).collect();
         let solvers =
             methods.iter().map(|method| method.prepare(&settings)).collect::<Result<_, _>>()?;
         Ok(Self {
@@ -150,8 +152,11 @@ impl Studio {
         let images: Vec<Vec<f32>> = jobs
             .par_iter()
             .map(|(method, _, measured)| {
-                let made = solvers[*method].reconstruct(&measured.measurements)?;
                 let white = measured.white_counts;
+                // The camera knows the noise of its readings.
+                let sigma = f64::from(noise * white) * 32.0;
+                let measurements = measured.measurements.clone().with_noise(sigma)?;
+                let made = solvers[*method].reconstruct(&measurements)?;
                 let of_white = |&value: &f32| (value / white).clamp(0.0, 1.0);
                 Ok::<_, EvalError>(made.image.pixels().iter().map(of_white).collect())
             })

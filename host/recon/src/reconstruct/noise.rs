@@ -37,6 +37,10 @@ const STEPS: usize = 24;
 /// Probability that the noise is smaller than the estimate.
 const CAUTION: f64 = 0.1;
 
+/// Noise over that of the quiet rows and pixels that is allowed: bright, coarse patterns may have more
+/// noise than fine ones, as photons do.
+const SLACK: f32 = 1.25;
+
 /// Number of random vectors for the determinant.
 const PROBES: usize = 2;
 
@@ -93,7 +97,7 @@ impl Statistics {
             below >= CAUTION * sum
         });
         let noise = noise.map_or(0.0, |(l, _)| l.variance.sqrt() as f32);
-        Self { noise: noise.min(of_the_quiet(rows, values)), falloff }
+        Self { noise: noise.min(SLACK * of_the_quiet(rows, values)), falloff }
     }
 }
 
@@ -318,8 +322,10 @@ mod tests {
                 let quiet = estimate(kind, 0.0, share);
                 assert!(quiet < 0.01, "kind {kind}, {share}: {quiet}");
                 for noise in [0.05, 0.2] {
-                    // Few readings tell little: the estimate is cautious, or has edges in it.
-                    let (least, most) = if share == 1.0 { (0.7, 1.4) } else { (0.0, 2.2) };
+                    // Few readings tell little, and edges hide noise: the estimate is cautious, or has
+                    // some of the edges in it.
+                    let tells = kind == 1 && share == 1.0;
+                    let (least, most) = if tells { (0.7, 1.4) } else { (0.0, 2.2) };
                     let found = estimate(kind, noise, share) / noise;
                     assert!(
                         (least..most).contains(&found),

@@ -113,24 +113,42 @@ mod tests {
     use crate::reconstruct::{Method, MethodSettings};
     use crate::testing::{noisy, scene, side};
 
+    /// Chooses `hadamard` for the first measurement of 1, and `omp` for others.
+    struct Chooser;
+
+    impl Reconstruct for Chooser {
+        fn name(&self) -> &str {
+            "chooser"
+        }
+
+        fn reconstruct(&self, _: &Measurements) -> Result<Reconstruction, ReconstructError> {
+            Err(ReconstructError::Failed("the choice makes the image".to_owned()))
+        }
+
+        fn settled(
+            &self,
+            first: &Measurements,
+        ) -> Result<Option<Arc<dyn Reconstruct>>, ReconstructError> {
+            let method = if first.values()[0] == 1.0 { Method::HADAMARD } else { Method::OMP };
+            method.prepare(&MethodSettings::default()).map(|method| Some(method.into()))
+        }
+    }
+
     #[test]
     fn the_choice_for_the_first_is_kept_until_it_is_due_again() {
-        let rows = Order::ZigZag.rows(side(32)).unwrap().first(500);
-        let of = |kind, noise| noisy(&rows, &scene(side(32), kind), noise, 4);
-        let auto = || Method::AUTO.prepare(&MethodSettings::default()).unwrap();
-        let alone = |m: &Measurements| auto().reconstruct(m).unwrap().report.chosen.unwrap();
-        let (first, other) = (of(1, 0.5), of(2, 0.0));
-        assert_ne!(alone(&first), alone(&other), "the test needs scenes of different choices");
-        let chosen = |stack: &Stacked, m: &Measurements| {
-            stack.reconstruct(m).unwrap().report.chosen.unwrap()
+        let rows = Order::ZigZag.rows(side(8)).unwrap();
+        let of = |first: f64| {
+            let values: Vec<f64> = (0..64).map(|k| if k == 0 { first } else { 0.25 }).collect();
+            Measurements::from_differential(&rows, &values).unwrap()
         };
-        let stack = Stacked::new(auto());
-        assert_eq!(chosen(&stack, &first), alone(&first));
-        assert_eq!(chosen(&stack, &other), alone(&first));
-        let live = Stacked::chosen_every(2, auto());
-        assert_eq!(chosen(&live, &first), alone(&first));
-        assert_eq!(chosen(&live, &other), alone(&first));
-        assert_eq!(chosen(&live, &other), alone(&other));
+        let (one, other) = (of(1.0), of(2.0));
+        let by = |stack: &Stacked, m: &Measurements| stack.reconstruct(m).unwrap().report.name;
+        let [hadamard, omp] = [Method::HADAMARD, Method::OMP].map(Method::name);
+        let stack = Stacked::new(Box::new(Chooser));
+        assert_eq!([by(&stack, &one), by(&stack, &other)], [hadamard, hadamard]);
+        let live = Stacked::chosen_every(2, Box::new(Chooser));
+        let made = [by(&live, &one), by(&live, &other), by(&live, &other), by(&live, &one)];
+        assert_eq!(made, [hadamard, hadamard, omp, omp]);
     }
 
     #[test]

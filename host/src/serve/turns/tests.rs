@@ -143,7 +143,7 @@ fn another_run_method_strength_or_sum_begins_a_new_estimate() {
     for (path, change) in [
         ("/api/settings", r#"{"order": "zig-zag"}"#),
         ("/api/settings", r#"{"sampling": 0.3}"#),
-        ("/api/settings", r#"{"sweeps": 2}"#),
+        ("/api/settings", r#"{"sweeps": 9}"#),
         ("/api/settings", r#"{"strength": 2}"#),
         ("/api/settings", r#"{"method": "tv"}"#),
         ("/api/settings", r#"{"frames": 4}"#),

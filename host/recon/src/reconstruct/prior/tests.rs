@@ -167,8 +167,8 @@ fn a_choice_leaves_out_a_network_that_does_not_take_the_side() {
     let network = Some(SharedNetwork::new(Oracle { truth: None, seed: 1 }));
     let settings = MethodSettings { network, ..MethodSettings::default() };
     let auto = Method::AUTO.prepare(&settings).unwrap();
-    let rows = Order::ZigZag.rows(side(16)).unwrap();
-    let small = crate::testing::noisy(&rows, &scene(side(16), 1), 0.1, 1);
+    let rows = Order::ZigZag.rows(side(8)).unwrap();
+    let small = crate::testing::noisy(&rows, &scene(side(8), 1), 0.1, 1);
     let chosen = auto.reconstruct(&small).unwrap().report.chosen;
     assert!(chosen.is_some_and(|chosen| chosen != "prior"), "{chosen:?}");
 }
