@@ -502,7 +502,11 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
     let (read, imaginary) = match (&file.imaginary, part) {
         (None, _) => {
             let y = file.readings.values();
-            (law::read(&file.h_row, y, file.claim).map_err(wrong)?, None)
+            let mut read = law::read(&file.h_row, y, file.claim).map_err(wrong)?;
+            if let Some(noise) = file.noise {
+                read.measurements = read.measurements.with_noise(noise).map_err(wrong)?;
+            }
+            (read, None)
         }
         (Some(_), Part::Real) => (plain(&file.readings)?, None),
         (Some(imaginary), Part::Imaginary) => (plain(imaginary)?, None),

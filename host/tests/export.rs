@@ -156,7 +156,8 @@ fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
 
     let whole = Source::read(&recording(), &SourceOptions::default()).unwrap();
     let method = Method::default().prepare(&MethodSettings::default()).unwrap();
-    let image = method.reconstruct(&whole.measurements).unwrap().image;
+    let image = method.reconstruct(&whole.measurements).unwrap();
+    let image = image.with_readings(&whole.measurements);
     let rows = Some(whole.measurements.rows());
     let context = ImageContext { rows, copies: SPREAD_COPIES, ..ImageContext::default() };
     let enhance = Enhance::built_in(&Device::cpu()).unwrap();

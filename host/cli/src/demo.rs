@@ -177,9 +177,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => share_of_white(&image, white),
     };
     let raw = seen(times.time("inverse_transform", || reconstruct::hadamard(&measurements)));
-    let Solved { image, report: method } =
+    let Solved { image, with_readings, report: method } =
         times.time("reconstruct", || solve(&args.method, &measurements))?;
-    let image = seen(image);
+    let (image, for_networks) = (seen(image), seen(with_readings));
 
     let truth = optics.focused_footprint()?.weights().to_vec();
     let (raw_quality, quality) = (score(&raw, &truth)?, score(&image, &truth)?);
@@ -188,7 +188,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let noise = measurements.noise().map(|counts| counts / f64::from(white));
     let readings = KnownReadings::new(method.used(), &settings, &measurements, noise);
     let rows = measurements.rows();
-    let stages = enhance_stages(&image, rows, readings, &optics, seed, &mut times)?;
+    let stages = enhance_stages(&for_networks, rows, readings, &optics, seed, &mut times)?;
     if quality.inverted {
         notes.push(
             "the image is darker where the scene is brighter: it is scored as blank".to_owned(),

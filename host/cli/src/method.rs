@@ -137,8 +137,9 @@ impl MethodArgs {
     }
 
     /// The result of a method, in the form of the report.
-    pub fn solved(&self, made: reconstruct::Reconstruction) -> Solved {
+    pub fn solved(&self, made: reconstruct::Reconstruction, measurements: &Measurements) -> Solved {
         Solved {
+            with_readings: made.with_readings(measurements),
             image: made.image,
             report: MethodReport { method: self.method, made: made.report },
         }
@@ -149,6 +150,8 @@ impl MethodArgs {
 pub struct Solved {
     /// The image, in the measurements' units.
     pub image: Image,
+    /// The same with the readings as they are, for networks.
+    pub with_readings: Image,
     /// The report.
     pub report: MethodReport,
 }
@@ -160,5 +163,5 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         Some(path) => made.with_context(|| path.display().to_string())?,
         None => made?,
     };
-    Ok(args.solved(made))
+    Ok(args.solved(made, measurements))
 }

@@ -2,7 +2,7 @@
 
 use super::{ExportError, Whole, detectors};
 use crate::files::FileError;
-use crate::files::measurement::PROVENANCE;
+use crate::files::measurement::{NOISE, PROVENANCE};
 use crate::files::npy::{Element, encode, encode_text, header};
 use crate::files::output::{write_atomic, write_in_pieces};
 use crate::provenance::Provenance;
@@ -32,6 +32,9 @@ pub(super) fn npz(
         match detectors {
             1 => zip.add("d", &encode(&[m], whole.source.measurements.values()))?,
             _ => zip.add("d", &encode(&[detectors, m], &detectors::means(whole)?))?,
+        }
+        if let (1, Some(noise)) = (detectors, whole.source.measurements.noise()) {
+            zip.add(NOISE, &encode(&[], &[noise]))?;
         }
         zip.add("sequence", &encode(&[count], &whole.sequence))?;
         zip.add("device_time_us", &encode(&[count], &whole.device_time_us))?;
@@ -99,7 +102,8 @@ fn frames(whole: &Whole, out: &Path, to: &mut impl Write) -> Result<(), ExportEr
     })
 }
 
-/// Writes the mean of all frames, one pattern a line, under the heading `n,h_row,d`. The numbers
+/// Writes the mean of all frames, one pattern a line, under the heading `n,h_row,d,noise`, without
+/// `noise` if that is not known. The numbers
 /// read back as they were. Comments before the heading have the provenance.
 pub(super) fn csv(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
     let measurements = &whole.source.measurements;
@@ -110,9 +114,15 @@ pub(super) fn csv(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<
             let what = if whole.is_simulated() { ", simulated" } else { "" };
             writeln!(file, "# mean of {} frames, ADC counts{what}", whole.frames())?;
             writeln!(file, "# {PROVENANCE}: {}", provenance.json())?;
-            writeln!(file, "n,h_row,d")?;
+            // The noise of `d` is the same for all.
+            let noise = measurements.noise().map(|noise| format!(",{noise:?}"));
+            let (heading, noise) = match &noise {
+                Some(noise) => ("n,h_row,d,noise", noise.as_str()),
+                None => ("n,h_row,d", ""),
+            };
+            writeln!(file, "{heading}")?;
             // A point shows that commas separate numbers.
-            lines.into_iter().try_for_each(|(row, d)| writeln!(file, "{n},{row},{d:?}"))
+            lines.into_iter().try_for_each(|(row, d)| writeln!(file, "{n},{row},{d:?}{noise}"))
         };
         Ok(write().map_err(|error| FileError::io(out, "write", error))?)
     })

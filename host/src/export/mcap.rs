@@ -34,10 +34,10 @@ pub(super) fn write(
     let mut enhancing = super::enhancing::Enhancing::new(options)?;
     let mut recording = Recording::open(&whole.path)?;
     each(whole, &mut recording, |what| {
-        if let What::Image(_, image) = what {
+        if let What::Image(_, image, _given) = what {
             images += 1;
             #[cfg(feature = "enhance")]
-            enhancing.look_at(&image);
+            enhancing.look_at(&_given);
             range = image
                 .pixels()
                 .iter()
@@ -65,9 +65,9 @@ pub(super) fn write(
                     .packet(heard.time_ns, heard.raw)
                     .and_then(|()| book.heard(heard.time_ns, heard.content, tally))
                     .and_then(|()| depth(&mut book, heard, options)),
-                What::Image(time_ns, image) => {
+                What::Image(time_ns, image, _given) => {
                     #[cfg(feature = "enhance")]
-                    if let Some(made) = enhancing.enhance(whole, time_ns, &image)? {
+                    if let Some(made) = enhancing.enhance(whole, time_ns, &_given)? {
                         let (spread, width) = (made.spread.as_deref(), made.half_width.as_deref());
                         book.enhanced(time_ns, &made.pixels, spread, width).map_err(io_error)?;
                     }
@@ -104,8 +104,8 @@ fn depth<W: Write>(_: &mut Book<W>, _: &Heard<'_>, _: &ExportOptions) -> io::Res
 
 enum What<'p> {
     Packet(&'p Heard<'p>, &'p Tally),
-    /// An image, and the time at which its last frame arrived.
-    Image(u64, Image),
+    /// An image, the same for networks, and the time at which its last frame arrived.
+    Image(u64, Image, Image),
 }
 
 /// Goes through the packets of a recording, and the images of its frames.
@@ -119,12 +119,13 @@ fn each(
     let problem = |frame| move |problem| ExportError::Image { path: path.clone(), frame, problem };
     let method = Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
     let method = Stacked::new(method);
-    let image = |sum: &Integrated, frame: usize| -> Result<Image, ExportError> {
+    let image = |sum: &Integrated, frame: usize| -> Result<[Image; 2], ExportError> {
         let measurements = sum
             .measurements_of(whole.detector, &setup, settling.as_ref(), whole.keep_leak)
             .map_err(|problem| whole.integrate(problem))?;
         let made = method.reconstruct(&measurements).map_err(problem(frame))?;
-        Ok(whole.source.flattened(made.image))
+        let given = made.with_readings(&measurements);
+        Ok([made.image, given].map(|image| whole.source.flattened(image)))
     };
     let mut sum = Integrated::new(&setup);
     // The image that is being summed: its number, and the time of its newest frame.
@@ -137,7 +138,8 @@ fn each(
             if let Some((before, time_ns)) = open
                 && before != number
             {
-                on(What::Image(time_ns, image(&sum, frames)?))?;
+                let [shown, given] = image(&sum, frames)?;
+                on(What::Image(time_ns, shown, given))?;
                 sum = Integrated::new(&setup);
             }
             sum.add(frame);
@@ -147,7 +149,10 @@ fn each(
         on(What::Packet(heard, tally))
     })?;
     match open {
-        Some((_, time_ns)) => on(What::Image(time_ns, image(&sum, frames)?)),
+        Some((_, time_ns)) => {
+            let [shown, given] = image(&sum, frames)?;
+            on(What::Image(time_ns, shown, given))
+        }
         None => Ok(()),
     }
 }

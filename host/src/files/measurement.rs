@@ -17,6 +17,7 @@
 //! | `y` | `(..., 2 M)` raw readings in time order +, -, +, -; other forms by [`Selection::form`]; NaN: not read |
 //! | `d` | `(..., M)` differential readings; NaN: not read |
 //! | `simulated` | optional: 1 if no real light was measured |
+//! | `noise` | optional, with `d`: standard deviation of the noise of a value of `d`, the same for all |
 //! | `recon` | optional `(n, n)`, or one for each measurement: someone's reconstruction, to compare with |
 //!
 //! `...` are any leading axes; the measurements in the leading axes are numbered in C order. Axes
@@ -45,7 +46,7 @@ pub use plain::{Plain, read_plain};
 use rayon::prelude::*;
 pub use stack::Stack;
 use std::path::Path;
-pub use write::{PROVENANCE, encode};
+pub use write::{NOISE, PROVENANCE, encode};
 
 /// What to read from a file, and what the file itself does not say.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -116,6 +117,8 @@ pub struct MeasurementFile {
     pub reference: Option<Reference>,
     /// Whether the file says that no real light was measured; `None` if it does not say.
     pub simulated: Option<bool>,
+    /// Standard deviation of the noise of a value of `d`, if the file says so and `d` was read.
+    pub noise: Option<f64>,
     /// Oddities of the file that do not make it unusable, one line each.
     pub notes: Vec<String>,
 }

@@ -153,13 +153,13 @@ pub fn one_image(
         return Err(OneError::Complex);
     }
     let solved = times.time("reconstruct", || request.solver.solve(request.input, &source))?;
-    let Solved { image, parts, used, order, report: method } = solved;
+    let Solved { image, with_readings, parts, used, order, report: method } = solved;
     let side = image.side().pixels();
     let correlation = source.reference.as_ref().and_then(|reference| {
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
     });
     let (sharp, enhancement) = if request.enhance {
-        let (sharp, mut reports) = enhance_frames(&[(&image, used.rows())], &mut times)?;
+        let (sharp, mut reports) = enhance_frames(&[(&with_readings, used.rows())], &mut times)?;
         (Some(sharp), reports.pop())
     } else {
         (None, None)

@@ -42,6 +42,8 @@ pub struct Solved {
     /// The image in the readings' units, corrected by the flat field; of complex readings, the
     /// magnitude.
     pub image: Image,
+    /// The same with the readings as they are, for networks.
+    pub with_readings: Image,
     /// Of complex readings, the images of the real and of the imaginary part.
     pub parts: Option<[Image; 2]>,
     /// The measurements that were used.
@@ -208,7 +210,9 @@ impl Solver {
                 .map_err(|problem| SolverError::Measurements { path: path.to_owned(), problem })
         };
         let (used, order) = take(&source.measurements)?;
-        let Reconstruction { image, report: made } = self.solve_one(&used)?;
+        let made = self.solve_one(&used)?;
+        let with_readings = source.flattened(made.with_readings(&used));
+        let Reconstruction { image, report: made } = made;
         let parts = match &source.imaginary {
             None => None,
             Some(imaginary) => Some([image.clone(), self.solve_one(&take(imaginary)?.0)?.image]),
@@ -219,7 +223,8 @@ impl Solver {
         };
         check_finite(path, &image)?;
         let image = source.flattened(image);
-        Ok(Solved { image, parts, used, order, report: MethodReport { method: *method, made } })
+        let report = MethodReport { method: *method, made };
+        Ok(Solved { image, with_readings, parts, used, order, report })
     }
 }
 

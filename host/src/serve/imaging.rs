@@ -386,9 +386,13 @@ impl Imaging {
         let measurements =
             look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
         let method = self.method(settings)?;
-        let Reconstruction { image, report } =
-            moving.image(method, &measurements, look, settings)?;
-        let image = FlatField::corrected(look.run.flat_field.as_ref(), image);
+        let made = moving.image(method, &measurements, look, settings)?;
+        let flat_field = look.run.flat_field.as_ref();
+        let for_networks = settings
+            .enhance
+            .then(|| FlatField::corrected(flat_field, made.with_readings(&measurements)));
+        let Reconstruction { image, report } = made;
+        let image = FlatField::corrected(flat_field, image);
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
         if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
@@ -400,11 +404,11 @@ impl Imaging {
         let mut all: Vec<String> = frame_warnings.iter().map(|&text| text.to_owned()).collect();
         let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
         let mut half_width = None;
-        if settings.enhance && white_counts > 0.0 {
+        if let Some(given) = for_networks.filter(|_| white_counts > 0.0) {
             let started = Instant::now();
             let depth = look.depth.as_ref().map(|depth| &depth.map);
             let (enhance, rows) = (self.enhance(settings)?, measurements.rows());
-            let (made, doubts) = enhance_frame(enhance, &image, rows, white_counts, depth)?;
+            let (made, doubts) = enhance_frame(enhance, &given, rows, white_counts, depth)?;
             short.extend(doubts.iter().map(Warning::short));
             all.extend(doubts.iter().map(Warning::to_string));
             enhancement = Some(Enhancement {

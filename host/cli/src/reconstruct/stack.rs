@@ -78,16 +78,18 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let others = times.time("reconstruct", || spinning(|| solve_all(args, &imaginary)))?;
     let mut others = others.into_iter();
     let (mut images, mut frames) = (Vec::new(), Vec::new());
+    let mut given = Vec::new();
     let unit = Unit::of_readings(sources[0].frames.is_some());
     let provenance = sources[0].taken.made(made());
     for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
         let warm = made.report.warm;
-        let Solved { mut image, report } = args.method.solved(made);
+        let Solved { mut image, with_readings, report } = args.method.solved(made, used);
         if let Some(other) = others.next() {
             image = Image::magnitude(&image, &other.image);
         }
         check_finite(&args.source.input, &image)?;
         let image = source.flattened(image);
+        given.push(source.flattened(with_readings));
         let dropped = |d: &nirspi_recon::Dropout| {
             format!("drop-out: {} from y[{}] on", count_of(d.length, "reading"), d.start)
         };
@@ -113,7 +115,7 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let mut sharp = None;
     if args.enhance {
         let made: Vec<(&Image, &Rows)> =
-            images.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
+            given.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
         let (pixels, reports) =
             spinning(|| enhance_frames(&made, &mut times)).context("--enhance")?;
         for (frame, report) in frames.iter_mut().zip(reports) {

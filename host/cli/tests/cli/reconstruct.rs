@@ -74,7 +74,7 @@ fn every_method_predicts_a_phantom_better_than_zero_does_and_says_how() {
     let share = |share: &str| {
         bench.run(&["reconstruct", "in.npz", "--sampling", share, "--json"]).succeeded().json()
     };
-    for written in ["0.3", "30%", "30"] {
+    for written in ["0.3", "30%", "30 %"] {
         assert_eq!(
             (&share(written)["used"], &share(written)["method"]),
             (&307.into(), &"auto".into())

@@ -204,7 +204,7 @@ fn images_that_start_from_those_before_are_switched_on_by_an_option_and_off_by_t
     for (method, words) in [
         (&["--method", "omp"][..], "--warm-start: omp makes each image by itself"),
         (
-            &["--basis", "haar"],
+            &["--method", "tikhonov", "--basis", "haar"],
             "--warm-start: frames that start from the frame before need the dct",
         ),
     ] {

@@ -158,7 +158,8 @@ impl Studio {
                 let measurements = measured.measurements.clone().with_noise(sigma)?;
                 let made = solvers[*method].reconstruct(&measurements)?;
                 let of_white = |&value: &f32| (value / white).clamp(0.0, 1.0);
-                Ok::<_, EvalError>(made.image.pixels().iter().map(of_white).collect())
+                let given = made.with_readings(&measurements);
+                Ok::<_, EvalError>(given.pixels().iter().map(of_white).collect())
             })
             .collect::<Result<_>>()?;
         let Some((_, _, first)) = jobs.first() else { return Ok(Vec::new()) };

@@ -325,7 +325,7 @@ mod tests {
                     // Few readings tell little, and edges hide noise: the estimate is cautious, or has
                     // some of the edges in it.
                     let tells = kind == 1 && share == 1.0;
-                    let (least, most) = if tells { (0.7, 1.4) } else { (0.0, 2.2) };
+                    let (least, most) = if tells { (0.7, 1.4) } else { (0.0, 2.6) };
                     let found = estimate(kind, noise, share) / noise;
                     assert!(
                         (least..most).contains(&found),

@@ -2,7 +2,7 @@
 
 use super::HeldBack;
 use crate::words::count_of;
-use crate::{Backend, Image};
+use crate::{Backend, Image, Measurements, fwht};
 use std::fmt;
 
 /// An image and how it was made.
@@ -12,6 +12,28 @@ pub struct Reconstruction {
     pub image: Image,
     /// How the image was made.
     pub report: Report,
+}
+
+impl Reconstruction {
+    /// The image with its measured rows as they were read, noise and all: what the networks were
+    /// trained on, which judge the noise themselves. A video's frame that has a past, and the image of
+    /// a method without weights, stay as they are.
+    #[must_use]
+    pub fn with_readings(&self, measurements: &Measurements) -> Image {
+        let weighted = self.report.reading_weight.is_some_and(|weight| weight < 1.0);
+        if self.report.warm || !weighted || self.image.side() != measurements.side() {
+            return self.image.clone();
+        }
+        let mut rows: Vec<f64> = self.image.pixels().iter().map(|&pixel| pixel.into()).collect();
+        let area = rows.len() as f64;
+        fwht::transform(&mut rows);
+        for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
+            rows[row as usize] = value;
+        }
+        fwht::transform(&mut rows);
+        let pixels = rows.into_iter().map(|value| (value / area) as f32).collect();
+        Image::new(self.image.side(), pixels)
+    }
 }
 
 /// How an image was made. Each method fills in the fields that apply to it; `Display` gives one
@@ -117,6 +139,30 @@ impl fmt::Display for Report {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_networks_get_the_readings_as_they_are() {
+        use crate::reconstruct::{Method, MethodSettings};
+        use crate::testing::{noisy, scene, side};
+        let rows = crate::Order::ZigZag.rows(side(32)).unwrap();
+        let all = noisy(&rows, &scene(side(32), 1), 8.0, 1).with_noise(8.0).unwrap();
+        let made = |method: Method, part: &Measurements| {
+            let ready = method.prepare(&MethodSettings::default()).unwrap();
+            ready.reconstruct(part).unwrap()
+        };
+        let smooth = made(Method::TIKHONOV, &all);
+        let plain = made(Method::HADAMARD, &all).image;
+        assert!(smooth.report.reading_weight.unwrap() < 0.9);
+        let close = |a: &Image, b: &Image| {
+            a.pixels().iter().zip(b.pixels()).all(|(a, b)| (a - b).abs() < 1e-4)
+        };
+        assert!(close(&smooth.with_readings(&all), &plain) && !close(&smooth.image, &plain));
+        // Rows that were not measured stay as predicted.
+        let part = all.take(None, 0.5).unwrap();
+        let smooth = made(Method::TIKHONOV, &part);
+        let kept = made(Method::TIKHONOV, &part.clone().with_noise(0.0).unwrap()).image;
+        assert!(close(&smooth.with_readings(&part), &kept));
+    }
 
     #[test]
     fn a_report_names_its_own_method_whatever_that_is() {

@@ -3,7 +3,7 @@
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
 use super::rows::{read_rows, read_side, shown};
-use super::{FileError, Form, MeasurementFile, Readings, Reference, Selection};
+use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Selection};
 use crate::files::fields::{Field, Fields};
 use nirspi_recon::law::{Claim, OVERLOAD};
 use nirspi_recon::{Image, Rows, Side};
@@ -22,6 +22,7 @@ pub(super) struct Opened {
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
     pub(super) simulated: Option<bool>,
+    noise: Option<f64>,
     pub(super) notes: Vec<String>,
 }
 
@@ -51,6 +52,7 @@ impl Opened {
             });
         }
         let name = readings_field(&fields, want)?;
+        let is_d = name == "d";
         let default = if name == "d" { Form::Differences } else { Form::Pairs };
         let form = want.form.unwrap_or(default);
         let mut notes = Vec::new();
@@ -88,6 +90,7 @@ impl Opened {
                 None
             });
         let simulated = read_simulated(&mut fields);
+        let noise = is_d.then(|| read_noise(&mut fields)).flatten();
         // A list that is not sound is refused with the first measurement.
         let every_row: Option<Vec<u32>> = rows.iter().copied().collect();
         let every_row = every_row.and_then(|rows| Rows::new(side, rows).ok());
@@ -101,6 +104,7 @@ impl Opened {
             readings,
             reference,
             simulated,
+            noise,
             notes,
         })
     }
@@ -197,6 +201,7 @@ impl Loaded<'_> {
             patterns: count,
             reference: opened.reference(index),
             simulated: opened.simulated,
+            noise: opened.noise,
             notes: opened.notes.clone(),
         })
     }
@@ -205,6 +210,15 @@ impl Loaded<'_> {
 /// Whether a number is a reading, and not a sign that there is none.
 pub(super) fn is_reading(value: f64) -> bool {
     value.abs() < OVERLOAD
+}
+
+/// The noise that the file states for `d`. A field of another kind says nothing.
+fn read_noise(fields: &mut Fields) -> Option<f64> {
+    if fields.is_unnamed() || !fields.holds(NOISE) {
+        return None;
+    }
+    let noise = *fields.read(NOISE, |_| Ok(())).ok()?.real.first()?;
+    (noise.is_finite() && noise >= 0.0).then_some(noise)
 }
 
 /// Whether the file says that no real light was measured. A field of another kind says nothing.

@@ -9,8 +9,11 @@ use std::path::Path;
 /// The field of an `.npz` file with its provenance, as JSON text.
 pub const PROVENANCE: &str = "provenance";
 
-/// The bytes of a `.npz` file with `n`, `h_row` and `d`, and the provenance as JSON text. `simulated`
-/// is 1 if no real light was measured, and is left out if that is not known.
+/// The field with the standard deviation of the noise of `d`, if it is known.
+pub const NOISE: &str = "noise";
+
+/// The bytes of a `.npz` file with `n`, `h_row`, `d`, its `noise` if that is known, and the provenance as
+/// JSON text. `simulated` is 1 if no real light was measured, and is left out if that is not known.
 ///
 /// # Errors
 /// [`FileError`] naming `path`, if the archive cannot be written.
@@ -28,6 +31,7 @@ pub fn encode(
         (PROVENANCE, npy::encode_text(&provenance.json())),
     ];
     let simulated = provenance.taken.simulated();
+    members.extend(measurements.noise().map(|noise| (NOISE, npy::encode(&[], &[noise]))));
     members.extend(simulated.map(|s| ("simulated", npy::encode(&[], &[i64::from(s)]))));
     archive::encode(path, &members)
 }

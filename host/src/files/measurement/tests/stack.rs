@@ -71,7 +71,7 @@ fn a_block_has_the_numbers_that_the_measurements_have_one_by_one() {
             "'<f8'",
             false,
             "(2, 3)".to_owned(),
-            npy_bytes(&[4.0, 2.5, -3.0, 1e300, 5.0, 4.0]),
+            npy_bytes(&[4.0, 2.5, -3.0, 8.0, 5.0, 4.0]),
         ),
         (Zip::Stored, "'>i2'", false, "(2, 1, 3)".to_owned(), noise(12, 2)),
         (
