@@ -62,7 +62,8 @@ pub fn sheet<'py>(
     whole("the stack", values.len(), n * n)?;
     let unit = unit(unit_name)?;
     let provenance = Taken::without_camera(Origin::Unknown).made(&made(py)?);
-    let png =
-        heavy(py, || Ok(Sheet::new(header, n, values.chunks_exact(n * n).collect(), unit).png(&provenance)))?;
+    let png = heavy(py, || {
+        Ok(Sheet::new(header, n, values.chunks_exact(n * n).collect(), unit).png(&provenance))
+    })?;
     Ok(PyBytes::new(py, &png))
 }

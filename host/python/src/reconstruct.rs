@@ -358,6 +358,10 @@ pub fn reconstruct_file<'py>(
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
     settings.check(method).map_err(of_method)?;
+    if method == Method::AUTO {
+        // The first measurement chooses, before several threads make images.
+        return Ok(None);
+    }
     let Some(mut several) = long(py, |_| Several::of(&path, &source).map_err(of_source))? else {
         return Ok(None);
     };

@@ -1,8 +1,8 @@
 //! Recordings: every frame with its times, and what else the file says.
 
-use crate::made::made;
 use crate::arrays::array;
 use crate::errors::{of_file, of_recording, of_source, refusal, refused};
+use crate::made::made;
 use crate::work::long;
 use nirspi::events;
 use nirspi::export::{ExportError, ExportOptions, Format, export};

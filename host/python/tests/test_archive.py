@@ -48,12 +48,12 @@ def test_the_table_has_the_programs_bytes(cli, folder, tmp_path):
 
 def test_a_row_is_what_reconstruct_gives(folder, tmp_path):
     # Of all patterns, the image is the same with any strength.
-    ns.Archive(folder, sampling="50%").run(tmp_path / "t.parquet")
+    ns.Archive(folder, sampling="50%", method="tikhonov").run(tmp_path / "t.parquet")
     rows = rows_of(tmp_path / "t.parquet")
     assert [row["image_id"] for row in rows] == [f"b/{k}.npz" for k in range(5)] + ["two.npz#0", "two.npz#1"]
     for row in rows:
         m = ns.load(folder / row["file"], index="all")
-        image = ns.reconstruct(m, sampling="50%")[row["index"]]
+        image = ns.reconstruct(m, sampling="50%", method="tikhonov")[row["index"]]
         assert np.asarray(row["image"], np.float32).tobytes() == np.asarray(image).tobytes()
         assert row["d"] == m.d[row["index"]].tolist() and row["rows"] == m.rows.tolist()
         assert row["n"] == m.n and row["simulated"] is None and row["truth"] is None

@@ -115,7 +115,7 @@ def test_a_file_that_is_read_while_it_is_reconstructed_is_never_whole_in_memory(
         finally:
             tracemalloc.stop()
 
-    path, options = tmp_path / "d.npz", {"method": "hadamard", "keep": None}
+    path, options = tmp_path / "d.npz", {"method": "hadamard"}
     pixels = 4 * 4000 * n * n
     assert peak(lambda: ns.reconstruct(ns.load(path, index="all"), **options)) > d.nbytes + pixels
     assert peak(lambda: ns.reconstruct(path, index="all", **options)) < pixels + d.nbytes / 4
@@ -124,7 +124,7 @@ def test_a_file_that_is_read_while_it_is_reconstructed_is_never_whole_in_memory(
 def test_sampling_is_read_as_people_write_it():
     m = measured()
     expected = ns.reconstruct(m, sampling=0.25)
-    for same in ["25%", 25, "0.25", "25 %"]:
+    for same in ["25%", "0.25", "25 %"]:
         assert (ns.reconstruct(m, sampling=same) == expected).all()
 
 

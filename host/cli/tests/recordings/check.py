@@ -111,7 +111,7 @@ table = pq.read_table(folder / "known.parquet")
 assert np.array_equal(np.array(table["truth"].to_pylist(), "<f4")[3], scaled.ravel())
 assert set(table["scene"].to_pylist()) == {"letter R"} and set(table["distance_m"].to_pylist()) == {0.3}
 
-csv = np.genfromtxt(folder / "out.csv", delimiter=",", names=True, skip_header=1)
+csv = np.genfromtxt(folder / "out.csv", delimiter=",", names=True, skip_header=2)
 assert np.array_equal(csv["d"], npz["d"]) and np.array_equal(csv["h_row"], npz["h_row"])
 
 # The Zarr store has the arrays of the npz file, with names of the dimensions.

@@ -52,7 +52,7 @@ const AS_BRIGHT: f64 = 0.1;
 /// all-on pattern is the `first` one, each pattern has `readings` readings.
 pub(super) fn sweeps(y: &[f64], readings: usize, first: usize) -> Option<usize> {
     // The side is a power of two, so the smaller image has a quarter of the pixels, or a quarter of that.
-    let counts = [64, 16, 4].into_iter().filter(|&count| y.len() % count == 0);
+    let counts = [64, 16, 4].into_iter().filter(|&count| y.len().is_multiple_of(count));
     counts.filter(|count| y.len() / count >= FEWEST.max(readings * (first + 1))).find(|count| {
         let blocks: Vec<&[f64]> = y.chunks_exact(y.len() / count).collect();
         blocks[1..].iter().all(|block| {

@@ -140,6 +140,9 @@ pub(super) enum Trusted {
     AsFarAsFine { standard_errors: f64 },
 }
 
+/// The misses of one fold, and what each candidate predicts for its measurements.
+type Fold = (Misses, Vec<Vec<f32>>);
+
 /// The miss for each number of atoms and each trust, and the fit of the finest rows.
 type Misses = Vec<([Miss; TRUST.len()], Line)>;
 
@@ -194,7 +197,7 @@ pub(super) fn choose_among(
         return Ok(None);
     }
     let fine = finer_half(problem.rows);
-    let results: Result<Vec<(Misses, Vec<Vec<f32>>)>, OmpError> = parts
+    let results: Result<Vec<Fold>, OmpError> = parts
         .par_iter()
         .map(|(kept, held)| {
             let predictions = predict(kept)?;
