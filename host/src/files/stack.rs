@@ -289,7 +289,7 @@ impl StackTarget {
             }
             Kind::Array(None) => write_atomic(&self.path, &npy::encode(&[side, side], values))?,
             Kind::Picture => {
-                write_atomic(&self.path, &encode_grey(side, side, values, provenance))?
+                write_atomic(&self.path, &encode_grey(side, side, values, provenance))?;
             }
             Kind::Folder(names) => {
                 let mut folder = OutputDir::create(&self.path)?;

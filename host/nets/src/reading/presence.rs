@@ -74,7 +74,7 @@ fn numbers(logits: &[f32], image: &[f32]) -> [f32; NUMBERS] {
     let level = mean(&mut image.iter().copied());
     let deviation = mean(&mut image.iter().map(|value| (value - level).powi(2))).sqrt();
     let rim = || {
-        let outer = |at: usize| at < 5 || at >= SIDE - 5;
+        let outer = |at: usize| !(5..SIDE - 5).contains(&at);
         image.iter().enumerate().filter(move |(at, _)| outer(at / SIDE) || outer(at % SIDE))
     };
     let rim_level = mean(&mut rim().map(|(_, &value)| value));

@@ -103,7 +103,8 @@ mod right {
     #[test]
     fn light_that_flickers_or_steps_is_not_doubted() {
         let rows = shown(&Order::Natural, 32);
-        let changes: [(&str, fn(f64) -> f64); 5] = [
+        type Change = (&'static str, fn(f64) -> f64);
+        let changes: [Change; 5] = [
             ("5 % at 100 Hz", |k| 1.0 + 0.05 * (k * 0.31).sin()),
             ("10 % mains", |k| 1.0 + 0.1 * (k * 0.013).sin()),
             ("step up", |k| if k < 700.0 { 1.0 } else { 1.3 }),
