@@ -193,7 +193,10 @@ mod tests {
         folder.write_log(&[entry(1, None), entry(2, None)]).unwrap();
         folder.entry(&entry(3, None)).unwrap();
         assert_eq!(lines(), 3);
-        folder.checkpoint(b"damaged", &[entry(1, None)]).unwrap();
+        let made = nirspi::provenance::Made::now("test", None, ["test"]);
+        let taken =
+            nirspi::provenance::Taken::without_camera(nirspi::provenance::Origin::Simulated);
+        folder.checkpoint(b"damaged", &[entry(1, None)], &taken.made(&made)).unwrap();
         assert!(path.join("plot.png").exists());
         let told = RunFolder::start(&path).err().unwrap().to_string();
         assert!(told.contains("a run is kept there"), "{told}");
