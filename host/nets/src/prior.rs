@@ -22,7 +22,7 @@ struct OnCpu(cpu::Prior);
 struct Shipped(OnceLock<Result<cpu::Prior, String>>);
 
 /// Settings with which every method of `nirspi_recon` can be prepared, `prior` among them: the
-/// defaults, and the [shipped](shipped) network.
+/// defaults, and the [shipped] network.
 ///
 /// ```
 /// use nirspi_recon::reconstruct::Method;

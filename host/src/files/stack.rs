@@ -155,7 +155,7 @@ impl ImageStack {
     }
 
     /// Cuts values that noise has taken out of `[0, 1]` to 0 or 1, as images in shares of white have
-    /// them. Returns the number of values cut. If a value is off by [`NOISE`] or more, the images
+    /// them. Returns the number of values cut. If a value is off by 0.5 or more, the images
     /// have another scale: they stay as they are.
     pub fn cut_noise(&mut self) -> usize {
         let is_near = |value: &f32| *value > -NOISE && *value < 1.0 + NOISE;

@@ -240,7 +240,7 @@ impl CameraModel {
         file::write(self)
     }
 
-    /// A short name of the whole description, from its [canonical](canonical) text: FNV-1a, 32 bit,
+    /// A short name of the whole description, from its [canonical] text: FNV-1a, 32 bit,
     /// not a checksum (Fowler, Noll and Vo).
     #[must_use]
     pub fn digest(&self) -> u32 {
