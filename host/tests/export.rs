@@ -9,7 +9,7 @@ use nirspi::provenance::Made;
 use nirspi::recording::Recording;
 use nirspi::source::{Source, SourceOptions};
 use nirspi_nets::Device;
-use nirspi_recon::reconstruct::{Method, MethodSettings};
+use nirspi_recon::reconstruct::Method;
 use nirspi_recon::{Order, Side};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ fn recording() -> PathBuf {
 }
 
 fn image_bits(source: &Source) -> Vec<u32> {
-    let method = Method::default().prepare(&MethodSettings::default()).unwrap();
+    let method = Method::default().prepare(&nirspi_nets::prior::settings()).unwrap();
     let image = method.reconstruct(&source.measurements).unwrap().image;
     image.pixels().iter().map(|pixel| pixel.to_bits()).collect()
 }
@@ -155,7 +155,7 @@ fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
     assert_eq!(images(&out, "/image", 32), images(&plain, "/image", 32));
 
     let whole = Source::read(&recording(), &SourceOptions::default()).unwrap();
-    let method = Method::default().prepare(&MethodSettings::default()).unwrap();
+    let method = Method::default().prepare(&nirspi_nets::prior::settings()).unwrap();
     let image = method.reconstruct(&whole.measurements).unwrap();
     let image = image.with_readings(&whole.measurements);
     let rows = Some(whole.measurements.rows());

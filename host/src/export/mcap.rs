@@ -13,7 +13,7 @@ use crate::tally::{Heard, Tally, hear_recording};
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use crate::{depth_image, recording::Pinhole};
 use nirspi_recon::Image;
-use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct, Stacked};
+use nirspi_recon::reconstruct::{Method, Reconstruct, Stacked};
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use nirspi_wire::DeviceMessage;
 use std::io::{self, Write};
@@ -117,7 +117,7 @@ fn each(
     let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
     let path = &whole.path;
     let problem = |frame| move |problem| ExportError::Image { path: path.clone(), frame, problem };
-    let method = Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
+    let method = Method::default().prepare(&super::settings()).map_err(problem(0))?;
     let method = Stacked::new(method);
     let image = |sum: &Integrated, frame: usize| -> Result<[Image; 2], ExportError> {
         let measurements = sum

@@ -468,3 +468,11 @@ fn read_truth(path: &Path, n: usize) -> Result<Vec<f32>, FileError> {
     }
     Ok(stack.values)
 }
+/// The settings of the default method, with the shipped network where networks are built in, as those
+/// of `nirspi reconstruct`.
+fn settings() -> nirspi_recon::reconstruct::MethodSettings {
+    #[cfg(feature = "enhance")]
+    return nirspi_nets::prior::settings();
+    #[cfg(not(feature = "enhance"))]
+    return nirspi_recon::reconstruct::MethodSettings::default();
+}

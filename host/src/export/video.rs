@@ -4,7 +4,7 @@ use super::{ExportError, Whole};
 use crate::files::output::write_atomic;
 use crate::picture::{Unit, video};
 use crate::provenance::Provenance;
-use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct, Stacked};
+use nirspi_recon::reconstruct::{Method, Reconstruct, Stacked};
 use nirspi_recon::{Image, Measurements};
 use std::path::Path;
 
@@ -59,7 +59,7 @@ pub(super) fn apng(
         let path = whole.path.clone();
         move |problem| ExportError::Image { path, frame, problem }
     };
-    let method = Method::default().prepare(&MethodSettings::default()).map_err(problem(0))?;
+    let method = Method::default().prepare(&super::settings()).map_err(problem(0))?;
     let method = Stacked::new(method);
     let mut images: Vec<Image> = Vec::new();
     whole.each(|frame| {
