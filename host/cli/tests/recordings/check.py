@@ -153,10 +153,11 @@ print(f"depth: {len(maps)} maps, median {np.median(depth_m):.3f} m (simulated)")
 run("export", "rec.mcap", "--to", "mcap", "--enhance", "--out", "enhanced.mcap")
 run("reconstruct", "rec.mcap", "--enhance", "--out", "enhanced", "--no-flat-field")
 made = {c.topic: m for _, c, _, m in messages("enhanced.mcap")[0]}
-enhanced, spread, width = (np.frombuffer(made[t].data, "<f4").reshape(64, 64) for t in ("/enhanced", "/spread", "/interval"))
+enhanced, spread = (np.frombuffer(made[t].data, "<f4").reshape(64, 64) for t in ("/enhanced", "/spread"))
+# The noise of an exported recording's frames is not handed on yet, so there is no interval.
+assert "/interval" not in made
 assert np.array_equal(enhanced, np.load(folder / "enhanced" / "enhanced.npy").reshape(64, 64))
 assert 0 < spread.max() < 0.5 and spread.min() >= 0, (spread.min(), spread.max())
-assert 0 < width.max() < 1 and width.min() >= 0, (width.min(), width.max())
 print(f"spread: median {np.median(spread):.4f}, greatest {spread.max():.3f} of white (simulated)")
 
 
