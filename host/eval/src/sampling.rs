@@ -3,8 +3,8 @@
 //!
 //! The image of all patterns of the same readings has the noise of the judged images, which favours
 //! methods that keep noise. So an independent measurement of the scene judges: the other half of a
-//! recording's frames, or a second file. Only where there is none, the same readings do, and the
-//! report says so.
+//! recording's frames, or a second file. Without an independent measurement, the same readings judge,
+//! and the report says so.
 
 mod plot;
 mod tables;
