@@ -36,6 +36,8 @@ pub struct Loaded {
     frames: Option<(u64, u64, u64, u64)>,
     notes: Vec<String>,
     flat_field: Option<Py<FlatField>>,
+    /// Standard deviation of the noise of a difference of the one measurement, if it is known.
+    noise: Option<f64>,
 }
 
 /// The measurements of a file or recording: one, or all with `index` or `detector` "all".
@@ -85,6 +87,7 @@ impl Loaded {
             frames: None,
             notes: stack.notes().to_vec(),
             flat_field: None,
+            noise: None,
         }))
     }
 
@@ -114,6 +117,7 @@ impl Loaded {
             }
         }
         let flat_field = first.flat_field.clone();
+        let noise = first.measurements.noise().filter(|_| !several);
         Ok(Self {
             n: side.pixels(),
             rows: array(py, rows.iter().map(|&row| i64::from(row)).collect()).unbind(),
@@ -124,6 +128,7 @@ impl Loaded {
             references: references.map(|images| array(py, images.concat()).unbind()),
             frames: first.frames.map(|c| (c.received, c.lost, c.corrupt, c.late)),
             notes,
+            noise,
             flat_field: flat_field.map(|flat| Py::new(py, FlatField(flat))).transpose()?,
             dropouts: sources.into_iter().map(|source| lost(source.dropouts)).collect(),
         })

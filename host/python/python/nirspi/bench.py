@@ -218,7 +218,7 @@ def total_variation(n: int, threads: int | None) -> dict[str, Contestants]:
     y = H(scene) + np.random.default_rng(1).normal(0, 0.05, len(rows))
     measurement = Measurement(d=y * n, rows=rows, n=n)
     # "sparse": measured rows take the values of the minimum too.
-    options: Any = {"method": "tv", "strength": 1.0, "keep": "sparse"}
+    options: Any = {"method": "tv", "strength": 1.0}
     whole: Contestants = {"nirspi": lambda: reconstruct(measurement, **options)}
     try:
         import torch

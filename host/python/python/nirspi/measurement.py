@@ -40,6 +40,9 @@ class Measurement:
         Whether ``d`` is copied. Without a copy, later changes of the array change the measurement.
     unit : str
         Unit of the readings, for pictures.
+    noise : float, optional
+        Standard deviation of the noise of a value of ``d``, the same for all. :func:`reconstruct`
+        weights each reading by it, and estimates it if it is not given.
 
     Attributes
     ----------
@@ -81,6 +84,7 @@ class Measurement:
     frames: Any = None
     notes: list[str] = field(default_factory=list)
     flat_field: Any = field(default=None, repr=False)
+    noise: float | None = None
 
     def __post_init__(self, y: Any, readings: str, transpose: bool, copy: bool) -> None:
         if (self.d is None) == (y is None):
@@ -92,6 +96,8 @@ class Measurement:
         if self.n is None:
             raise Error("no n, expected the side of the image")
         self.n = _arrays.side(self.n)
+        if self.noise is not None and not 0 <= self.noise < np.inf:
+            raise Error(f"noise is {self.noise}, expected a standard deviation of 0 or more")
         if self.rows is None:
             raise Error("no rows, expected Hadamard rows or the name of an order")
         named = isinstance(self.rows, str)
@@ -202,6 +208,8 @@ class Measurement:
             Name of the file; ``.npz`` is added if it is missing.
         """
         fields: dict[str, Any] = {"n": self.n, "h_row": self.rows, "d": self.d}
+        if self.noise is not None and self.d.ndim == 1:
+            fields["noise"] = self.noise
         if self.reference is not None:
             fields["recon"] = np.asarray(self.reference)
         np.savez(path, **fields)
@@ -350,4 +358,5 @@ def _of_loaded(found: _nirspi.Loaded) -> Measurement:
     made.reference = None if references is None else references.reshape(*leading, made.n, made.n)
     made.frames = None if frames is None else Account(*frames)
     made.flat_field, made.notes = found.flat_field, found.notes
+    made.noise = found.noise
     return made

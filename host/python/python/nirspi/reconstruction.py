@@ -24,7 +24,7 @@ def methods() -> dict[str, str]:
     --------
     >>> import nirspi as ns
     >>> list(ns.methods())
-    ['hadamard', 'omp', 'pseudo-inverse', 'tikhonov', 'fista', 'tv', 'prior']
+    ['hadamard', 'omp', 'pseudo-inverse', 'tikhonov', 'fista', 'tv', 'prior', 'auto']
     """
     return {word: about for word, _name, about in _nirspi.methods()}
 
@@ -164,6 +164,7 @@ def reconstruct(
     if index is not None and index != "all":
         measurement = measurement[index]
     n = measurement.n
+    options["noise"] = measurement.noise
     if dictionary is not None:
         options["dictionary"] = _atoms(dictionary, n)
     d = measurement.d
@@ -214,6 +215,7 @@ def method_options(
         "as_printed": bool(as_printed),
         "non_negative": bool(non_negative),
         "warm_start": bool(warm_start),
+        "noise": None,
         "dark": bool(dark),
         "device": str(device),
     }
