@@ -37,12 +37,6 @@ impl Integrated {
         }
     }
 
-    /// A sum that another program made: of this many frames, which sum this many sweeps together.
-    #[must_use]
-    pub fn of_sums(sums: Vec<i64>, frames: u64, sweeps: u64) -> Self {
-        Self { sums, frames, sweeps, ..Self::of_patterns(0) }
-    }
-
     /// Number of patterns of a sweep.
     #[must_use]
     pub fn patterns(&self) -> usize {
@@ -57,17 +51,23 @@ impl Integrated {
 
     /// Adds one frame that [fits](Self::fits).
     pub fn add(&mut self, frame: &Frame<'_>) {
-        self.spread.add(frame.samples.iter(), u64::from(frame.sweeps));
-        self.add_sums(frame);
+        self.add_sums(frame.samples.iter(), u64::from(frame.sweeps));
+        self.flags = self.flags.with(frame.flags);
     }
 
-    fn add_sums(&mut self, frame: &Frame<'_>) {
-        for (sum, sample) in self.sums.iter_mut().zip(frame.samples.iter()) {
-            *sum = sum.saturating_add(sample);
+    /// Adds a frame of which only the sums of this many sweeps are at hand, one sum for each
+    /// [pattern](Self::patterns).
+    pub fn add_sums(&mut self, sums: impl ExactSizeIterator<Item = i64> + Clone, sweeps: u64) {
+        self.spread.add(sums.clone(), sweeps);
+        self.accumulate(sums, sweeps);
+    }
+
+    fn accumulate(&mut self, sums: impl Iterator<Item = i64>, sweeps: u64) {
+        for (total, sum) in self.sums.iter_mut().zip(sums) {
+            *total = total.saturating_add(sum);
         }
         self.frames += 1;
-        self.sweeps += u64::from(frame.sweeps);
-        self.flags = self.flags.with(frame.flags);
+        self.sweeps += sweeps;
     }
 
     /// Number of summed frames.
@@ -208,8 +208,9 @@ impl Newest {
             self.total.sweeps -= oldest.sweeps;
         }
         let mut alone = Integrated::of_patterns(self.total.sums.len());
-        alone.add_sums(frame);
-        self.total.add_sums(frame);
+        alone.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
+        alone.flags = frame.flags;
+        self.total.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
         self.frames.push_back(alone);
     }
 

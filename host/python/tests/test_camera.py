@@ -65,6 +65,22 @@ def test_frames_are_read_captured_and_recorded(tmp_path):
     assert camera.closed
 
 
+def test_a_measurement_knows_its_noise_however_it_was_taken(tmp_path):
+    with virtual() as camera:
+        recorded = camera.record(tmp_path / "a.mcap", frames=40)
+        captured = camera.capture(40)
+        with camera.frames() as frames:
+            taken = [next(frames) for _ in range(40)]
+            summed = frames.measurement(taken)
+            assert frames.measurement(taken[:1]).noise is None
+        scale = taken[0].sweeps * (camera.setup["clocks_per_pattern"] - camera.setup["blanked"])
+    scattered = np.std([frame.sums / scale for frame in taken], axis=0, ddof=1).mean() / 40**0.5
+    for measurement in (recorded, captured, summed):
+        assert measurement.noise == pytest.approx(scattered, rel=0.1)
+    loaded = ns.load(tmp_path / "a.mcap")
+    assert loaded.noise == recorded.noise and np.allclose(loaded.d, recorded.d, rtol=1e-12)
+
+
 def test_a_capture_shows_the_scene():
     scene = np.zeros((32, 32), np.float32)
     scene[6:14, 8:26] = 0.9

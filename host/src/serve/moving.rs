@@ -224,8 +224,8 @@ mod tests {
         let run = Arc::new(RunSetup { setup, settling: None, flat_field: None });
         let mut moving = Moving::default();
         let warm = |newest: u64| {
-            let sums = (0..patterns as i64).map(|k| 1000 / (k + 1)).collect();
-            let (sum, arrived) = (Integrated::of_sums(sums, 1, 1), Instant::now());
+            let (mut sum, arrived) = (Integrated::new(&run.setup), Instant::now());
+            sum.add_sums((0..patterns).map(|k| 1000 / (k as i64 + 1)), 1);
             let measurements = sum.measurements(&run.setup, None, false).unwrap();
             let look = Look { sum, run: Arc::clone(&run), depth: None, arrived, newest };
             let made = moving.image(&faulty, &measurements, &look, &settings);

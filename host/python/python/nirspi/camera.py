@@ -121,10 +121,8 @@ class Frames(Iterator[Frame]):
         """
         if not frames:
             raise Error("frames is empty, expected at least one frame")
-        sums = np.sum([frame.sums for frame in frames], axis=0, dtype=np.int64)
-        sweeps = sum(frame.sweeps for frame in frames)
-        n, rows, d, flat = self._run.readings(sums, len(frames), sweeps)
-        return Measurement(d=d, rows=rows, n=n, unit="ADC counts", flat_field=flat)
+        sums = np.concatenate([frame.sums for frame in frames], dtype=np.int64)
+        return _measurement(self._run.readings(sums, [frame.sweeps for frame in frames]))
 
     def close(self) -> None:
         """Ends the run; the LEDs are off."""
@@ -374,16 +372,10 @@ class Camera:
         self._ended(run)
 
     def _measurement(self, run: Any) -> Measurement:
-        n, rows, d, notes, flat = run.measurement()
-        return Measurement(
-            d=d,
-            rows=rows,
-            n=n,
-            unit="ADC counts",
-            frames=self.account,
-            notes=notes,
-            flat_field=flat,
-        )
+        readings, notes = run.measurement()
+        made = _measurement(readings)
+        made.frames, made.notes = self.account, notes
+        return made
 
     def _ended(self, run: Any) -> None:
         """Says what a run lacks."""
@@ -409,6 +401,12 @@ class Camera:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _measurement(readings: Any) -> Measurement:
+    """The measurement of what the library made of frames."""
+    n, rows, d, noise, flat = readings
+    return Measurement(d=d, rows=rows, n=n, unit="ADC counts", flat_field=flat, noise=noise)
 
 
 def _small(value: Any, name: str, most: int) -> int | None:

@@ -14,8 +14,9 @@ use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::source::Source;
 use nirspi::sync::{Clock, HostClock};
+use nirspi_recon::Measurements;
 use nirspi_wire::{DeviceMessage, Frame};
-use numpy::PyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -193,7 +194,21 @@ pub(super) enum Made {
 
 type FrameTuple<'py> = (Bound<'py, PyArray1<i64>>, u32, u64, u32, u16, u64);
 
+/// `(n, rows, d, noise of a value of d, flat field)`.
+type Readings<'py> =
+    (usize, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, Option<f64>, Option<FlatField>);
+
 impl Run {
+    fn of_python<'py>(&self, py: Python<'py>, measured: &Measurements) -> Readings<'py> {
+        (
+            measured.side().pixels(),
+            array(py, measured.rows().iter().map(|&row| i64::from(row)).collect()),
+            array(py, measured.values().to_vec()),
+            measured.noise(),
+            self.flat.clone().map(FlatField),
+        )
+    }
+
     /// The next frame; `None` at the end of the run. At Ctrl-C the LEDs are off before the exception is.
     fn receive(&self, py: Python<'_>) -> PyResult<Option<Item>> {
         self.owned()?;
@@ -345,61 +360,42 @@ impl Run {
         }
     }
 
-    /// The measurement of the sums of some frames of the run: `(n, rows, d, flat field)`.
-    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
+    /// The measurement of some frames of the run together, whose sums follow one another:
+    /// `(n, rows, d, noise, flat field)`.
     fn readings<'py>(
         &self,
         py: Python<'py>,
-        sums: Vec<i64>,
-        frames: u64,
-        sweeps: u64,
-    ) -> PyResult<(usize, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, Option<FlatField>)>
-    {
+        sums: PyReadonlyArray1<'py, i64>,
+        sweeps: Vec<u64>,
+    ) -> PyResult<Readings<'py>> {
         let measures = lock(&self.shared.measures).clone();
         let Some((setup, settling)) = measures else {
             return Err(refused("the run has not begun, take a frame first"));
         };
-        if sums.len() != setup.rows.len() {
-            let (found, expected) = (sums.len(), setup.rows.len());
-            return Err(refused(format!("sums of {found} patterns, expected {expected}")));
+        let (sums, patterns) = (sums.as_slice()?, setup.rows.len());
+        if sums.len() != sweeps.len() * patterns {
+            let (found, frames) = (sums.len(), sweeps.len());
+            return Err(refused(format!(
+                "{found} sums in {frames} frames, expected {patterns} in each"
+            )));
         }
-        let summed = Integrated::of_sums(sums, frames, sweeps);
-        let measured = summed.measurements(&setup, settling.as_ref(), false).map_err(refusal)?;
-        let rows = measured.rows().iter().map(|&row| i64::from(row)).collect();
-        Ok((
-            measured.side().pixels(),
-            array(py, rows),
-            array(py, measured.values().to_vec()),
-            self.flat.clone().map(FlatField),
-        ))
+        let mut integrated = Integrated::new(&setup);
+        for (frame, &sweeps) in sums.chunks_exact(patterns).zip(&sweeps) {
+            integrated.add_sums(frame.iter().copied(), sweeps);
+        }
+        let measured =
+            integrated.measurements(&setup, settling.as_ref(), false).map_err(refusal)?;
+        Ok(self.of_python(py, &measured))
     }
 
-    /// The measurement of all frames together: `(n, rows, d, notes, flat field)`.
-    #[expect(clippy::type_complexity, reason = "a tuple for Python")]
-    fn measurement<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(
-        usize,
-        Bound<'py, PyArray1<i64>>,
-        Bound<'py, PyArray1<f64>>,
-        Vec<String>,
-        Option<FlatField>,
-    )> {
+    /// The measurement of all frames together: `(n, rows, d, noise, flat field)`, and notes.
+    fn measurement<'py>(&self, py: Python<'py>) -> PyResult<(Readings<'py>, Vec<String>)> {
         let held = lock(&self.made);
         let Some(Made::Captured(captured)) = &*held else {
             return Err(refused("the run has not ended, or has failed"));
         };
         let source = Source::of_capture(captured).map_err(refusal)?;
-        let measured = &source.measurements;
-        let rows = measured.rows().iter().map(|&row| i64::from(row)).collect();
-        Ok((
-            measured.side().pixels(),
-            array(py, rows),
-            array(py, measured.values().to_vec()),
-            source.notes,
-            self.flat.clone().map(FlatField),
-        ))
+        Ok((self.of_python(py, &source.measurements), source.notes))
     }
 }
 
