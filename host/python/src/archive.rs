@@ -9,9 +9,10 @@ use crate::work::{backend, long};
 use crate::{measurement, reconstruct};
 use nirspi::archive::{
     ArchiveError, ArchiveOptions, Grid, GridAxes, ImageFiles, RowReader, Shard, Work, archive,
-    archive_part, write_file,
+    archive_part,
 };
 use nirspi::exposure::Length;
+use nirspi::files::output::write_atomic;
 use nirspi::reconstruct::Solver;
 use nirspi::virtual_camera::{CameraModel, read_camera_model};
 use nirspi_recon::Sampling;
@@ -99,9 +100,9 @@ impl Table {
             }
             let files = match names {
                 Some(names) => ImageFiles::named(&folder, names, reader),
-                None => ImageFiles::of(&folder, reader),
+                None => ImageFiles::of(&folder, reader).map_err(of_archive)?,
             };
-            Ok(Self(Kind::Files(Box::new(files.map_err(of_archive)?))))
+            Ok(Self(Kind::Files(Box::new(files))))
         })
     }
 
@@ -165,7 +166,7 @@ impl Table {
             let made = archive(self.0.work(), &options, stop, &mut |_| {}).map_err(of_archive)?;
             if let Kind::Grid(grid) = &self.0 {
                 let card = options.out.with_extension("md");
-                write_file(&card, grid.card(&made).as_bytes()).map_err(of_archive)?;
+                write_atomic(&card, grid.card(&made).as_bytes()).map_err(of_file)?;
             }
             json(&made)
         })

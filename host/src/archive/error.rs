@@ -11,20 +11,6 @@ pub enum ArchiveError {
     /// A file or folder cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The program has no object stores.
-    #[error(
-        "{}: object stores are not in this program: build it with --features object-store",
-        .0.display()
-    )]
-    NoStores(PathBuf),
-    /// An address that names no store.
-    #[error("{}: {problem}, expected an address such as s3://bucket/folder", .address.display())]
-    Address {
-        /// The address, without a password.
-        address: PathBuf,
-        /// The problem.
-        problem: String,
-    },
     /// The folder has no measurements.
     #[error(
         "{}: no measurement files in the folder, expected at least one of {expected}",

@@ -25,8 +25,6 @@ mod place;
 mod report;
 mod rows;
 mod shelf;
-#[cfg(feature = "object-store")]
-mod store;
 #[cfg(test)]
 mod tests;
 
@@ -39,7 +37,6 @@ pub use files::{Shard, find};
 pub use grid::{Grid, GridAxes, GridError};
 use journal::{About, Journal};
 use place::{Opened, Place};
-pub use place::{is_folder, write_file};
 pub use report::{ArchiveReport, Skipped};
 pub use rows::{ImageFiles, RowReader, RowsError};
 use serde_json::{Map, Value};
@@ -82,7 +79,7 @@ pub trait Work: Sync {
 /// How to make a table.
 #[derive(Debug, Clone)]
 pub struct ArchiveOptions {
-    /// The table to write, a Parquet file: a path, or an address in an object store.
+    /// The table to write, a Parquet file: a path.
     pub out: PathBuf,
     /// Number of items to work on at a time; `None` means as many as the machine has cores.
     pub jobs: Option<NonZeroUsize>,
@@ -115,7 +112,7 @@ pub fn archive(
     stop: &AtomicBool,
     watch: &mut dyn FnMut(Progress),
 ) -> Result<ArchiveReport, ArchiveError> {
-    archive_to(&Place::of(&options.out)?, work, options, stop, watch)
+    archive_to(&Place::of(&options.out), work, options, stop, watch)
 }
 
 fn archive_to(
@@ -228,7 +225,7 @@ pub fn archive_part(
     stop: &AtomicBool,
 ) -> Result<ArchiveReport, ArchiveError> {
     let began = Instant::now();
-    let place = Place::of(out)?;
+    let place = Place::of(out);
     let out = place.shown();
     let failed = |error| io_error(out, error);
     let count = work.names().len();

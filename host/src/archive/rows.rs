@@ -229,30 +229,20 @@ pub struct ImageFiles {
 }
 
 impl ImageFiles {
-    /// The measurement files in a folder and the folders below. `folder` is a path, or an address in
-    /// an object store.
+    /// The measurement files in a folder and the folders below.
     ///
     /// # Errors
-    /// [`ArchiveError`] if the folder has no measurement files, or the store cannot be used.
+    /// [`ArchiveError`] if the folder has no measurement files.
     pub fn of(folder: &Path, reader: RowReader) -> Result<Self, ArchiveError> {
-        Self::at(Place::of(folder)?, reader)
-    }
-
-    pub(super) fn at(folder: Place, reader: RowReader) -> Result<Self, ArchiveError> {
+        let folder = Place::of(folder);
         Ok(Self { names: folder.find()?, folder, reader })
     }
 
     /// These files, as paths relative to the folder with `/` between names. Files that are not there
     /// give no rows.
-    ///
-    /// # Errors
-    /// [`ArchiveError`] if `folder` is an address of no store.
-    pub fn named(
-        folder: &Path,
-        names: Vec<String>,
-        reader: RowReader,
-    ) -> Result<Self, ArchiveError> {
-        Ok(Self { folder: Place::of(folder)?, names, reader })
+    #[must_use]
+    pub fn named(folder: &Path, names: Vec<String>, reader: RowReader) -> Self {
+        Self { folder: Place::of(folder), names, reader }
     }
 }
 

@@ -42,8 +42,6 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
         "nirspi dataset",
         "8 s of a processor; tests/cli/archive.rs writes a smaller set",
     ),
-    ("docs/clusters.md", "export AWS", "an account of the user; .ci/run stores"),
-    ("docs/clusters.md", "s3://", "needs an object store; .ci/run stores"),
     ("docs/clusters.md", "ray start", "needs Ray; .ci/run cluster"),
     ("docs/live-page.md", "curl", "needs the page of another terminal; tests/cli/serve.rs"),
     ("docs/mutants.md", "cargo mutants", "hours; .ci/run mutants"),

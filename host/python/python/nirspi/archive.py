@@ -114,8 +114,7 @@ class Work:
         Parameters
         ----------
         out : path
-            The table, a name that ends in ``.parquet``: a path, or an address in an object store such
-            as ``s3://bucket/table.parquet``.
+            The table, a name that ends in ``.parquet``.
         jobs : int, optional
             Items to work on at a time. Default: the number of cores.
         resume : bool
@@ -167,8 +166,6 @@ class Archive(Work):
     ----------
     files : path, or list of paths
         A folder, with the folders below; hidden files and links to folders are left out. Or files.
-        A folder may be an address in an object store such as ``"s3://bucket/archive"``, if the
-        package was built with the feature ``object-store``.
     enhance : bool
         Whether networks also enlarge and deblur images of 32 x 32 and 64 x 64.
     **options
@@ -200,9 +197,7 @@ class Archive(Work):
         _known(options, _OF_SOURCES | _OF_METHODS | {"dictionary"})
         folder: str
         names: list[str] | None
-        if isinstance(files, str) and "://" in files:
-            folder, names = files, None
-        elif isinstance(files, (str, os.PathLike)):
+        if isinstance(files, (str, os.PathLike)):
             folder, names = os.path.abspath(files), None
             if not os.path.isdir(folder):
                 raise Error(f"{os.fspath(files)}: expected a folder of measurements, or a list of files")

@@ -6,7 +6,7 @@ and settings, so that a part that is made twice is the same part: a worker that 
 changes no result.
 
 Workers read files where the program that calls :func:`run` reads them, and write to the same folder:
-a file system that all nodes share, or for ``out`` an object store (``s3://``, ``gs://``).
+a file system that all nodes share.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ANSWER_S = 300.0
 
 
 class _Folder:
-    """The folder of the parts, here or in an object store."""
+    """The folder of the parts, on a file system."""
 
     def __init__(self, out: str) -> None:
         from pyarrow import fs
