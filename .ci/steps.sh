@@ -52,7 +52,6 @@ by_name=(
     "fuzz            a search for bytes that break a reader's law, FUZZ_S seconds for each (4); a C++ compiler, crates.io"
     "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
-    "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
     "memory          tests of the Python package under Valgrind; Debian's valgrind, PyPI"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
@@ -421,12 +420,6 @@ step_flash() {
     # Without optimisation and GPUs: it is built for this alone.
     cargo test --locked -p nirspi --no-default-features --features flash --lib \
         --config 'profile.dev.package."*".opt-level=0' -- boards flash
-}
-
-# Without optimisation: it is built for this alone, three minutes of one core.
-step_zenoh() {
-    cargo test --locked -p nirspi --no-default-features --features zenoh --lib --test zenoh \
-        --config 'profile.dev.package."*".opt-level=0' -- relay:: late_host no_camera address::
 }
 
 step_mie() {

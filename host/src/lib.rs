@@ -12,7 +12,6 @@
 //!   camera,
 //! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
 //!   programs, [`replay`] plays it back as a camera,
-//! * [`relay`] gives the frames of a camera to other programs,
 //! * [`sync`] brings frames of several cameras into one time and order,
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
@@ -84,8 +83,6 @@ pub mod provenance;
 #[cfg(not(target_family = "wasm"))]
 pub mod reconstruct;
 pub mod recording;
-#[cfg(not(target_family = "wasm"))]
-pub mod relay;
 pub mod replay;
 pub mod resolution;
 #[cfg(feature = "virtual-camera")]

@@ -9,7 +9,7 @@ use nirspi_wire::{
 };
 
 /// The identity of the recorded camera in the wire's form.
-pub(crate) fn identity(camera: &CameraIdentity) -> Identity<'_> {
+pub(super) fn identity(camera: &CameraIdentity) -> Identity<'_> {
     let has = |name: &str| camera.capabilities.iter().any(|word| word == name);
     let known = Capabilities::NAMES.iter().filter(|(_, name)| has(name)).map(|&(known, _)| known);
     let capabilities = known.fold(Capabilities::default(), Capabilities::with);
@@ -37,7 +37,7 @@ fn version(text: &str) -> Version {
 }
 
 /// The status of a camera that has not measured yet. `run` is the number of the run before.
-pub(crate) fn status(run: u16) -> Status {
+pub(super) fn status(run: u16) -> Status {
     Status {
         state: State::Idle,
         fault: None,
@@ -58,7 +58,7 @@ pub(crate) fn status(run: u16) -> Status {
 }
 
 /// How a configuration differs from the recorded one. `None` means that they are the same.
-pub(crate) fn misfit(asked: &Configuration<'_>, recorded: &Recorded) -> Option<ConfigProblem> {
+pub(super) fn misfit(asked: &Configuration<'_>, recorded: &Recorded) -> Option<ConfigProblem> {
     let MeasurementSetup { rows, clocks_per_pattern, blanked, adc_latency, sweeps, .. } =
         &recorded.setup;
     let numbers = [

@@ -56,7 +56,6 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
         "sync left.mcap",
         "needs two recordings at the same time; tests/cli/sync.rs",
     ),
-    ("docs/several-cameras.md", "--camera zenoh:", "needs the feature zenoh; .ci/run zenoh"),
     ("docs/several-cameras.md", "/opt/ros", "needs ROS 2"),
     ("docs/several-cameras.md", "nirspi.ros2", "needs ROS 2"),
     ("docs/several-cameras.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
