@@ -306,7 +306,7 @@ step_python() {
     # Not `cargo clippy`, which would check each dependency that the package's build compiles.
     CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo RUSTC_WORKSPACE_WRAPPER=clippy-driver \
         cargo rustc --locked --release --lib --manifest-path host/python/Cargo.toml -- -D warnings
-    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 rosbags==0.11.9 ruff==0.17.6 scipy xarray zarr==3.1.6
+    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 rosbags==0.11.9 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
     cargo build --locked --release
     (
@@ -400,7 +400,7 @@ step_tcp() {
 step_recordings() {
     cargo build --locked --release
     python_with recordings datasets==5.2.0 duckdb==2.0.0 mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 \
-        pandas==3.1.1 pyarrow==26.0.1 websockets==17.4 xarray==2026.9.0 zarr==3.1.6
+        pandas==3.1.1 pyarrow==26.0.1 websockets==17.4
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
     target/recordings/bin/python host/cli/tests/recordings/check.py target/release/nirspi

@@ -55,7 +55,7 @@ mod _nirspi {
     #[pymodule_export]
     use crate::reconstruct::{bases, methods, reconstruct, reconstruct_file, reconstruct_matrix};
     #[pymodule_export]
-    use crate::recording::{export_zarr, read_recording};
+    use crate::recording::read_recording;
     #[pymodule_export]
     use crate::work::{devices, panic_for_tests};
 }

@@ -1,5 +1,5 @@
-//! Exports a recording for other programs: arrays for NumPy and Zarr, a table, a dataset in Parquet, a
-//! video, a recording with images.
+//! Exports a recording for other programs: arrays for NumPy, a table, a dataset in Parquet, a video,
+//! a recording with images.
 //!
 //! # Invariant
 //! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
@@ -15,7 +15,6 @@ mod mcap;
 mod parquet;
 #[cfg(feature = "pictures")]
 mod video;
-mod zarr;
 
 use crate::files::{FileError, npy};
 use crate::integrate::{IntegrateError, Integrated};
@@ -46,8 +45,6 @@ pub enum Format {
     Npz,
     /// NumPy: one array.
     Npy,
-    /// A folder of arrays for Python's `zarr` and `xarray`.
-    Zarr,
     /// A table for spreadsheets.
     Csv,
     /// The dataset form.
@@ -64,7 +61,6 @@ impl Format {
     pub const ALL: &'static [Self] = &[
         Self::Npz,
         Self::Npy,
-        Self::Zarr,
         Self::Csv,
         Self::Parquet,
         Self::Mcap,
@@ -78,7 +74,6 @@ impl Format {
         match self {
             Self::Npz => "npz",
             Self::Npy => "npy",
-            Self::Zarr => "zarr",
             Self::Csv => "csv",
             Self::Parquet => "parquet",
             Self::Mcap => "mcap",
@@ -100,7 +95,7 @@ impl Format {
 
     /// Whether the file holds readings alone. A flat field corrects images, not readings.
     fn holds_readings(self) -> bool {
-        matches!(self, Self::Npz | Self::Npy | Self::Zarr | Self::Csv | Self::Parquet)
+        matches!(self, Self::Npz | Self::Npy | Self::Csv | Self::Parquet)
     }
 
     /// What a file of this format holds, in one line.
@@ -112,7 +107,6 @@ impl Format {
                  (D, M), frames (F, D, M)"
             }
             Self::Npy => "the readings of each frame alone, (F, M)",
-            Self::Zarr => "a folder with the arrays of npz, for Python's zarr and xarray",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
             Self::Parquet => {
                 "the dataset: one frame a row, with set-up, time, serial, depth, truth"
@@ -162,7 +156,7 @@ pub struct ExportOptions {
 /// What was exported.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Exported {
-    /// The file, or the folder of arrays.
+    /// The file.
     pub file: PathBuf,
     /// The form of the file.
     pub format: Format,
@@ -238,7 +232,7 @@ pub enum ExportError {
     },
 }
 
-/// Exports a recording to the file or folder `out`, which is whole or not made. The file holds its
+/// Exports a recording to the file `out`, which is whole or not made. The file holds its
 /// provenance, of the recording and of the program `made`; an `.npy` file has no place for it and gets
 /// a file `NAME.npy.json` beside it.
 ///
@@ -272,14 +266,13 @@ pub fn export(
     match format {
         Format::Npz => arrays::npz(&whole, out, options.detector.is_none(), provenance)?,
         Format::Npy => arrays::npy(&whole, out, provenance)?,
-        Format::Zarr => zarr::write(&whole, out, provenance)?,
         Format::Csv => arrays::csv(&whole, out, provenance)?,
         Format::Parquet => parquet::write(&whole, out, options, provenance)?,
         Format::Mcap => images = mcap::write(&whole, out, options, provenance)?,
         #[cfg(feature = "pictures")]
         Format::Apng => images = video::apng(&whole, out, provenance)?,
     }
-    let bytes = size_of(out);
+    let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
     let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
     let (file, mut notes) = (out.to_owned(), whole.source.notes);
     if whole.source.flat_field.is_some() && format.holds_readings() {
@@ -290,14 +283,6 @@ pub fn export(
         );
     }
     Ok(Exported { file, format, bytes, frames, patterns, images, notes })
-}
-
-/// Bytes of a file, or of all files of a folder.
-fn size_of(path: &Path) -> u64 {
-    let Ok(entries) = std::fs::read_dir(path) else {
-        return std::fs::metadata(path).map_or(0, |file| file.len());
-    };
-    entries.filter_map(Result::ok).map(|entry| size_of(&entry.path())).sum()
 }
 
 /// A recording that was read once: the mean of its frames, and the numbers and times of the frames.

@@ -47,7 +47,6 @@ mod testing;
 #[cfg(not(target_family = "wasm"))]
 mod text;
 #[cfg(not(target_family = "wasm"))]
-pub(crate) mod whole_folder;
 
 #[cfg(feature = "training")]
 pub(crate) use archive::encode as encode_archive;
