@@ -400,11 +400,10 @@ step_tcp() {
 step_recordings() {
     cargo build --locked --release
     python_with recordings datasets==5.2.0 duckdb==2.0.0 mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 \
-        pandas==3.1.1 pyarrow==26.0.1 websockets==17.4
+        pandas==3.1.1 pyarrow==26.0.1
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
     target/recordings/bin/python host/cli/tests/recordings/check.py target/release/nirspi
-    target/recordings/bin/python host/cli/tests/recordings/live.py target/release/nirspi
 }
 
 step_dissector() {
