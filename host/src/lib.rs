@@ -12,7 +12,7 @@
 //!   camera,
 //! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
 //!   programs, [`replay`] plays it back as a camera,
-//! * [`sync`] brings frames of several cameras into one time and order,
+//! * [`frame_time`] gives the frames of a camera times by this computer's clock,
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
@@ -67,6 +67,7 @@ pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
 pub mod fpga;
+pub mod frame_time;
 pub mod gateware;
 pub mod heartbeat;
 pub mod imaging;
@@ -98,7 +99,6 @@ pub mod signal;
 #[cfg(not(target_family = "wasm"))]
 pub mod source;
 pub mod stage_times;
-pub mod sync;
 pub mod tally;
 #[cfg(feature = "training")]
 pub mod training;

@@ -76,6 +76,11 @@ fn read(path: &Path) -> (Vec<Vec<u8>>, Option<String>) {
     (packets, recording.end().cut_short.clone())
 }
 
+/// The times of the packets of a recording.
+fn times(path: &Path) -> Vec<u64> {
+    Recording::open(path).unwrap().map(|packet| packet.unwrap().time_ns).collect()
+}
+
 /// Number of the found packets that are packets of the recording, in their order.
 fn in_order(found: &[Vec<u8>], of: &[Vec<u8>]) -> usize {
     let (mut rest, mut count) = (of, 0);
@@ -153,6 +158,9 @@ fn many_damaged_places_cost_what_they_hit() {
     assert!(recovered.bytes_lost > 0 && recovered.frames_lost.unwrap() > 0, "{recovered}");
     let (again, told) = read(&whole);
     assert_eq!((again, told), (found, None));
+    let before = times(&path);
+    assert!(before.is_sorted() && before[0] < before[before.len() - 1]);
+    assert_eq!(times(&whole), before);
     let mut recording = Recording::open(&whole).unwrap();
     let counters = tally_recording(&mut recording).unwrap().account().counters();
     let account = recording.end().account.clone().unwrap();

@@ -1,4 +1,4 @@
-//! `nirspi export`, `recover`, `sync`: a recording in another form, or repaired; several in one time.
+//! `nirspi export`, `recover`: a recording in another form, or repaired.
 
 use super::camera::ModelArgs;
 use super::print;
@@ -7,7 +7,6 @@ use super::report::{ReportArgs, words};
 use anyhow::Result;
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::recording::{Target, recover as recovered};
-use nirspi::sync::recordings;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -81,25 +80,4 @@ pub struct RecoverArgs {
 pub fn recover(args: &RecoverArgs) -> Result<ExitCode> {
     let recovered = recovered(&args.recording, &Target::New(args.out.clone()))?;
     args.report.print_answer(&recovered, |recovered| print::line(recovered))
-}
-
-/// Fit the clocks of cameras that were recorded side by side, and give all frames one time: the computer's
-///
-/// Run one `nirspi capture` for each camera at the same time on one computer, then this command on the recordings.
-#[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  nirspi sync left.mcap right.mcap --out frames.csv")]
-pub struct SyncArgs {
-    /// Recordings (.mcap), one of each camera; the others are compared with the first
-    #[arg(required = true, value_name = "REC")]
-    recordings: Vec<PathBuf>,
-    /// Table of the frames of all recordings in the order of their times
-    #[arg(long, value_name = "FILE.csv")]
-    out: Option<PathBuf>,
-    #[command(flatten)]
-    report: ReportArgs,
-}
-
-pub fn sync(args: &SyncArgs) -> Result<ExitCode> {
-    let synced = recordings(&args.recordings, args.out.as_deref())?;
-    args.report.print_answer(&synced, |s| print::notes(&s.notes).and_then(|()| print::line(s)))
 }

@@ -89,7 +89,6 @@ commands! {
     Dataset(dataset::Args) => dataset::run,
     Export(export::Args) => export::run,
     Recover(export::RecoverArgs) => export::recover,
-    Sync(export::SyncArgs) => export::sync,
     Serve(serve::Args) => serve::run,
     Virtual(serve_virtual::Args) => serve_virtual::run,
     Devices(devices::Args) => devices::run,

@@ -19,7 +19,7 @@ use nirspi::link::{CameraAddress, Link};
 use nirspi::recording::Target;
 use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
-use nirspi::sync::HostClock;
+use nirspi::frame_time::HostClock;
 use nirspi::virtual_camera::{MemoryLink, calibrate_against_white, flat_field_against_white};
 use options::Options;
 use pyo3::exceptions::{PyConnectionError, PyOSError};

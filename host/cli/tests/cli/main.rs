@@ -42,7 +42,6 @@ mod serve_controls;
 mod serve_guarded;
 mod settings;
 mod sparse_problems;
-mod sync;
 mod train;
 mod update;
 mod versions;

@@ -13,7 +13,7 @@ use nirspi::integrate::Integrated;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::source::Source;
-use nirspi::sync::{Clock, HostClock};
+use nirspi::frame_time::{Clock, HostClock};
 use nirspi_recon::Measurements;
 use nirspi_wire::{DeviceMessage, Frame};
 use numpy::{PyArray1, PyReadonlyArray1};
