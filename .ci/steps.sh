@@ -57,7 +57,7 @@ by_name=(
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, seeds"
-    "cluster         archives and sweeps on a Ray cluster of two nodes, and by Dask; PyPI, 700 MB"
+    "cluster         archives and sweeps on a Ray cluster of two nodes; PyPI, 700 MB"
     "python-peers    the Python package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
 
@@ -306,7 +306,7 @@ step_python() {
     # Not `cargo clippy`, which would check each dependency that the package's build compiles.
     CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo RUSTC_WORKSPACE_WRAPPER=clippy-driver \
         cargo rustc --locked --release --lib --manifest-path host/python/Cargo.toml -- -D warnings
-    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 rosbags==0.11.9 ruff==0.17.6 scipy xarray
+    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
     cargo build --locked --release
     (
@@ -328,7 +328,7 @@ step_python_peers() {
 }
 
 step_cluster() {
-    python_package numpy pyarrow pytest==9.2.0 'ray[data]==2.60.0' 'dask[distributed]==2026.8.0'
+    python_package numpy pyarrow pytest==9.2.0 'ray[data]==2.60.0'
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/cluster)
 }
 

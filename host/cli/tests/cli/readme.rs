@@ -51,8 +51,6 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/quality.md", "eval table", "minutes; tests/cli/rain.rs has fewer scenes"),
     ("docs/quality.md", "metrics sharp.npy", "the user's stacks; tests/cli/metrics.rs"),
     ("docs/reliability.md", "serve_soak.py", "ten minutes; .ci/run crowd"),
-    ("docs/several-cameras.md", "/opt/ros", "needs ROS 2"),
-    ("docs/several-cameras.md", "nirspi.ros2", "needs ROS 2"),
     ("docs/several-cameras.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
     ("docs/several-cameras.md", "benches/", "the user's archive; tests/cli/archive.rs"),
     ("docs/training.md", "python ", "needs torch and data of other groups"),

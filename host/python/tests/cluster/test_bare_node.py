@@ -2,7 +2,6 @@
 
 import os
 import pathlib
-import re
 import subprocess
 import sys
 import sysconfig
@@ -14,10 +13,8 @@ import pytest
 
 import nirspi as ns
 import nirspi.ray
-from conftest import ROOT
 
 pytest.importorskip("ray")
-pytest.importorskip("dask.distributed")
 pq = pytest.importorskip("pyarrow.parquet")
 
 from nodes import alive, stop, two_nodes  # noqa: E402 - it needs Ray
@@ -44,7 +41,7 @@ def bare(tmp_path_factory):
             if not entry.name.startswith("nirspi") and not (there / entry.name).exists():
                 (there / entry.name).symlink_to(entry.path)
     clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    asked = [str(python), "-c", "import ray.data, dask.distributed, numpy, pyarrow; import nirspi"]
+    asked = [str(python), "-c", "import ray.data, numpy, pyarrow; import nirspi"]
     told = subprocess.run(asked, env=clean, cwd=place, capture_output=True, text=True).stderr.strip()
     if not told.endswith("No module named 'nirspi'"):
         pytest.skip(f"no second environment with Ray and without nirspi can be made here: {told[-300:]}")
@@ -100,33 +97,3 @@ def test_a_node_without_the_package_is_named_before_anything_is_written(bare, ar
     parts = sorted((tmp_path / "parts").glob("part-*.parquet"))
     rows = [row for part in parts for row in pq.read_table(part).to_pylist()]
     assert rows == pq.read_table(tmp_path / "alone.parquet").to_pylist()
-
-
-def test_the_recipe_for_dask_names_a_worker_without_the_package(bare, archive, tmp_path, monkeypatch):
-    import dask.distributed
-
-    monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/clusters.md").read_text(), re.S)
-    (recipe,) = (block for block in blocks if "dask.distributed" in block)
-    client = dask.distributed.Client
-    one = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
-    with dask.distributed.LocalCluster(**one) as cluster:
-        words = [cluster.scheduler_address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        program = [str(bare), "-m", "distributed.cli.dask_worker", *words]
-        clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        worker = subprocess.Popen(program, env=clean, cwd=tmp_path)
-        try:
-            with client(cluster.scheduler_address) as waiting:
-                waiting.wait_for_workers(2, timeout=LONGEST_S)
-            monkeypatch.setattr(
-                dask.distributed, "Client", lambda **_words: client(cluster.scheduler_address)
-            )
-            names = {"__name__": "__main__", "ns": ns, "archive": ns.Archive(archive, method="hadamard")}
-            error = told_by(lambda: exec(compile(recipe, "docs/clusters.md", "exec"), names))
-        finally:
-            worker.terminate()
-            worker.wait(60)
-    assert isinstance(error, ns.Error), error
-    assert f"expected nirspi {ns.__version__} on every worker" in str(error), error
-    assert str(error).count("tcp://") == 1 and "No module named 'nirspi'" in str(error), error
-    assert not list(tmp_path.glob("dask/part-*"))

@@ -1,4 +1,4 @@
-"""The Python code of docs/clusters.md runs, from top to bottom: one process, Ray, Dask."""
+"""The Python code of docs/clusters.md runs, from top to bottom: one process, Ray."""
 
 import re
 
@@ -9,7 +9,6 @@ import nirspi as ns
 from conftest import ROOT
 
 pytest.importorskip("ray")
-pytest.importorskip("dask.distributed")
 pq = pytest.importorskip("pyarrow.parquet")
 
 
@@ -25,7 +24,7 @@ def test_the_code_of_the_page_runs_and_every_way_gives_the_same_rows(monkeypatch
     text = (ROOT / "docs/clusters.md").read_text()
     names = {"__name__": "__main__"}
     blocks = list(re.finditer(r"```python\n(.*?)```", text, re.S))
-    assert len(blocks) == 3
+    assert len(blocks) == 2
     try:
         for block in blocks:
             line = text[: block.start(1)].count("\n")
@@ -34,6 +33,5 @@ def test_the_code_of_the_page_runs_and_every_way_gives_the_same_rows(monkeypatch
         ray.shutdown()
     rows = pq.read_table("table.parquet").to_pylist()
     assert len(rows) == 100 and names["report"].rows == 100 and names["simulated"].rows == 8
-    for folder in ("parts", "dask"):
-        parts = sorted((tmp_path / folder).glob("part-*.parquet"))
-        assert [row for part in parts for row in pq.read_table(part).to_pylist()] == rows, folder
+    parts = sorted((tmp_path / "parts").glob("part-*.parquet"))
+    assert [row for part in parts for row in pq.read_table(part).to_pylist()] == rows
