@@ -57,7 +57,7 @@ by_name=(
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, seeds"
-    "cluster         archives and sweeps on a Ray cluster of two nodes; PyPI, 700 MB"
+    "cluster         files and seeds on a Ray cluster of two nodes; PyPI, 700 MB"
     "python-peers    the Python package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
 
@@ -399,8 +399,7 @@ step_tcp() {
 
 step_recordings() {
     cargo build --locked --release
-    python_with recordings datasets==5.2.0 duckdb==2.0.0 mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 \
-        pandas==3.1.1 pyarrow==26.0.1
+    python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
     target/recordings/bin/python host/cli/tests/recordings/check.py target/release/nirspi

@@ -259,7 +259,8 @@ impl Clock {
         // at its ends. Of 59 743 simulated links with delays of four kinds, the largest error was
         // 0.7 of this; one link of another draw had 0.95, with short delays at one end alone.
         let turn = 5.0 * (excess + 1e3) / (to - from);
-        let known = (count >= ENOUGH).then_some((edge, turn)).filter(|&(_, turn)| turn <= MOST_DRIFT);
+        let known =
+            (count >= ENOUGH).then_some((edge, turn)).filter(|&(_, turn)| turn <= MOST_DRIFT);
         // Where the drift cannot be known, a clock without drift is the better guess.
         let slope = known.map_or(0.0, |(edge, _)| edge.clamp(-MOST_DRIFT, MOST_DRIFT));
         if slope != edge {

@@ -16,8 +16,7 @@
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
-//! * [`reconstruct`] makes an image or many of what was read, [`archive`] one table of a whole folder,
-//!   whose columns are in [`dataset`],
+//! * [`reconstruct`] makes an image or many of what was read,
 //! * [`files`], [`picture`] and [`scene`] read and write what users see, [`resolution`] measures
 //!   the finest detail, [`legibility`] reads characters,
 //! * [`imaging`] scales, enhances and judges images, and gives warnings,
@@ -44,15 +43,11 @@
 
 pub mod about;
 pub mod account;
-#[cfg(not(target_family = "wasm"))]
-pub mod archive;
 pub mod boards;
 pub mod calibration;
 pub mod capture;
 pub mod causes;
 pub mod clock;
-#[cfg(not(target_family = "wasm"))]
-pub mod dataset;
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 mod depth_image;
 #[cfg(not(target_family = "wasm"))]
@@ -76,8 +71,6 @@ pub mod integrate;
 #[cfg(feature = "training")]
 pub mod legibility;
 pub mod link;
-#[cfg(not(target_family = "wasm"))]
-mod parquet;
 #[cfg(feature = "pictures")]
 pub mod picture;
 pub mod provenance;

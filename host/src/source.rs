@@ -13,11 +13,9 @@ use crate::tally::Misfit;
 use nirspi_recon::law::{self, Doubt, Reading};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{
-    Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, Side,
-    reconstruct,
+    Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, reconstruct,
 };
 use serde::Serialize;
-use serde_json::{Value, json};
 use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -407,42 +405,6 @@ fn not_whole(missing: &str) -> String {
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
 
 impl SourceOptions {
-    /// The options as data, for keys: each option by its name (`key::the_key_of_options_is_frozen`).
-    #[must_use]
-    pub fn key(&self) -> Value {
-        let Self { index, detector, file, part, keep_leak, no_flat_field } = self;
-        // The index of a file is that of these options.
-        let Selection {
-            index: _,
-            form,
-            field,
-            patterns_first,
-            side,
-            shown,
-            transpose,
-            decimal_comma,
-        } = file;
-        let of_index = |index: &Option<Index>| match index {
-            None => Value::Null,
-            Some(Index::One(index)) => (*index).into(),
-            Some(Index::All) => "all".into(),
-        };
-        json!({
-            "index": of_index(index),
-            "detector": of_index(detector),
-            "form": form.map(Form::name),
-            "field": field,
-            "patterns_first": patterns_first,
-            "side": side.map(Side::pixels),
-            "shown": shown.as_ref().map(Order::to_string),
-            "transpose": transpose,
-            "decimal_comma": decimal_comma,
-            "part": part.name(),
-            "keep_leak": keep_leak,
-            "no_flat_field": no_flat_field,
-        })
-    }
-
     /// The requested index.
     ///
     /// # Errors
@@ -620,36 +582,6 @@ fn as_they_are(rows: &Rows, readings: &Readings) -> Result<Reading, MeasurementE
     };
     let (dropouts, outliers, doubts) = (Vec::new(), Vec::new(), Vec::new());
     Ok(Reading { measurements, dropouts, outliers, doubts, dark_level })
-}
-
-#[cfg(test)]
-mod key {
-    use super::*;
-
-    #[test]
-    fn the_key_of_options_is_frozen() {
-        let options = SourceOptions {
-            index: Some(Index::All),
-            file: Selection { form: Some(Form::Halves), ..Selection::default() },
-            part: Part::Real,
-            ..SourceOptions::default()
-        };
-        let frozen = json!({
-            "index": "all",
-            "detector": null,
-            "form": "halves",
-            "field": null,
-            "patterns_first": false,
-            "side": null,
-            "shown": null,
-            "transpose": false,
-            "decimal_comma": false,
-            "part": "real",
-            "keep_leak": false,
-            "no_flat_field": false,
-        });
-        assert_eq!(options.key(), frozen);
-    }
 }
 
 #[cfg(all(test, feature = "training"))]

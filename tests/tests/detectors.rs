@@ -3,22 +3,19 @@
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi::account::LossCounters;
-use nirspi::archive::{ArchiveOptions, ArchiveReport, ImageFiles, RowReader, Shard, archive};
 use nirspi::capture::{Calibration, Capture, CaptureOptions, capture};
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::files::measurement::{Form, Selection};
 use nirspi::link::{Link, Received};
-use nirspi::reconstruct::{Recipe, Solver};
 use nirspi::recording::{Recording, RecordingInfo, Target, recover};
 use nirspi::replay::ReplayLink;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi::source::{FirstPatterns, Index, Source, SourceOptions};
+use nirspi::source::{Index, Source, SourceOptions};
 use nirspi::tally::tally_recording;
 use nirspi::virtual_camera::{CameraModel, MemoryLink, VirtualCamera, VirtualOptics};
 use nirspi_optics::{Chain, LedArray, Scene};
-use nirspi_recon::reconstruct::{Method, MethodSettings};
-use nirspi_recon::{Order, Sampling, reconstruct};
+use nirspi_recon::{Order, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_HOST_PACKET;
 use nirspi_wire::{
@@ -27,7 +24,6 @@ use nirspi_wire::{
 };
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 const FRAMES: u32 = 4;
@@ -315,72 +311,6 @@ fn a_choice_of_detectors_that_does_not_fit_is_one_line() {
     export(&path, &npz, Format::Npz, &ExportOptions::default(), &made()).unwrap();
     let error = Source::read(&npz, &of_detector(Index::One(1))).unwrap_err().to_string();
     assert!(error.starts_with("--detector belongs to recordings"), "{error}");
-}
-
-fn solver() -> Solver {
-    let recipe = Recipe {
-        method: Method::default(),
-        settings: MethodSettings::default(),
-        dictionary: None,
-        first: FirstPatterns::default(),
-        sampling: Sampling::HALF,
-    };
-    Solver::new(recipe).unwrap()
-}
-
-fn reader(source: SourceOptions) -> RowReader {
-    RowReader::new(source, solver())
-}
-
-#[test]
-fn an_archive_has_a_row_of_each_detector() {
-    let root = tempfile::tempdir().unwrap();
-    let folder = root.path().join("archive");
-    std::fs::create_dir(&folder).unwrap();
-    let (recording, arrays) = (folder.join("three.mcap"), folder.join("three.npz"));
-    // Of detector 2, frame 1 is lost.
-    let judge = only_frames(|frame| if frame == 5 { Fate::Drop } else { Fate::Pass });
-    run(Box::new(Tampered::new(link(&three()), judge)), Some(&recording));
-    export(&recording, &arrays, Format::Npz, &ExportOptions::default(), &made()).unwrap();
-
-    let of_recording = reader(of_detector(Index::All)).rows(&recording, "three.mcap").unwrap();
-    let of_arrays = reader(SourceOptions::default()).rows(&arrays, "three.npz").unwrap();
-    assert_eq!((of_recording.len(), of_arrays.len()), (DETECTORS, DETECTORS));
-    for detector in 0..DETECTORS {
-        let source = Source::read(&recording, &of_detector(Index::One(detector))).unwrap();
-        let image = solver().solve(&recording, &source).unwrap().image;
-        for (row, name) in
-            [(&of_recording[detector], "three.mcap"), (&of_arrays[detector], "three.npz")]
-        {
-            assert_eq!(row.image_id, format!("{name}#{detector}"));
-            assert_eq!((row.file.as_deref(), row.index), (Some(name), Some(detector as i64)));
-            let place = format!("{name}, detector {detector}");
-            assert!(row.d == source.measurements.values(), "{place}: readings");
-            assert_eq!(row.rows, source.measurements.rows().as_slice());
-            assert!(row.image.as_deref() == Some(image.pixels()), "{place}: image");
-            assert_eq!(row.simulated, Some(true));
-        }
-        let meta: serde_json::Value = serde_json::from_str(&of_recording[detector].meta).unwrap();
-        assert_eq!(meta["detector"], detector);
-        let frames = &meta["reconstruction"]["frames"];
-        let (got, lost) = if detector == 2 { (3, 1) } else { (4, 0) };
-        assert_eq!((&frames["received"], &frames["lost"]), (&got.into(), &lost.into()));
-    }
-
-    // The same folder as tables: of detector 0 with every row of the arrays, and of all detectors.
-    let table = |name: &str, source: SourceOptions| -> ArchiveReport {
-        let files = ImageFiles::of(&folder, reader(source)).unwrap();
-        let out = root.path().join(name);
-        let options = ArchiveOptions { out, jobs: None, resume: false, shard: Shard::WHOLE };
-        archive(&files, &options, &AtomicBool::new(false), &mut |_| {}).unwrap()
-    };
-    let report = table("first.parquet", SourceOptions::default());
-    assert_eq!((report.rows, report.skipped.len()), (1 + DETECTORS as u64, 0));
-    let report = table("all.parquet", of_detector(Index::All));
-    assert_eq!(report.rows, DETECTORS as u64);
-    let [skipped] = &report.skipped[..] else { panic!("{:?}", report.skipped) };
-    assert_eq!(skipped.file, "three.npz");
-    assert!(skipped.reason.contains("--detector belongs to recordings"), "{}", skipped.reason);
 }
 
 fn made() -> nirspi::provenance::Made {

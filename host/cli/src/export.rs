@@ -31,15 +31,6 @@ pub struct Args {
     /// mcap: also enhanced images, and the spread of each pixel if the scene were measured again (9 runs of the network each)
     #[arg(long)]
     enhance: bool,
-    /// parquet: what the camera looked at
-    #[arg(long, value_name = "TEXT")]
-    scene: Option<String>,
-    /// parquet: distance to the target in metres
-    #[arg(long, value_name = "M")]
-    distance_m: Option<f64>,
-    /// parquet: an image of the scene as it is, (n, n)
-    #[arg(long, value_name = "FILE.npy")]
-    truth: Option<PathBuf>,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -51,9 +42,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = ExportOptions {
         keep_leak: args.keep_leak,
         detector: args.detector,
-        scene: args.scene.clone(),
-        distance_m: args.distance_m,
-        truth: args.truth.clone(),
         model: Some(args.model.read()?),
         enhance: args.enhance,
     };

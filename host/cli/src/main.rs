@@ -11,7 +11,6 @@ mod calibration;
 mod camera;
 mod camera_model;
 mod capture;
-mod dataset;
 mod deblur;
 mod demo;
 mod devices;
@@ -86,7 +85,6 @@ commands! {
     Example(example::Args) => example::run,
     Reconstruct(reconstruct::Args) => reconstruct::run,
     Capture(capture::Args) => capture::run,
-    Dataset(dataset::Args) => dataset::run,
     Export(export::Args) => export::run,
     Recover(export::RecoverArgs) => export::recover,
     Serve(serve::Args) => serve::run,

@@ -1,5 +1,5 @@
-//! Exports a recording for other programs: arrays for NumPy, a table, a dataset in Parquet, a video,
-//! a recording with images.
+//! Exports a recording for other programs: arrays for NumPy, a table, a video, a recording with
+//! images.
 //!
 //! # Invariant
 //! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
@@ -12,11 +12,10 @@ mod detectors;
 #[cfg(feature = "enhance")]
 mod enhancing;
 mod mcap;
-mod parquet;
 #[cfg(feature = "pictures")]
 mod video;
 
-use crate::files::{FileError, npy};
+use crate::files::FileError;
 use crate::integrate::{IntegrateError, Integrated};
 use crate::provenance::Made;
 use crate::recording::{Recording, RecordingError};
@@ -29,7 +28,7 @@ use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::words::count;
-use nirspi_wire::{Depth, DeviceMessage, Frame};
+use nirspi_wire::Frame;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -47,8 +46,6 @@ pub enum Format {
     Npy,
     /// A table for spreadsheets.
     Csv,
-    /// The dataset form.
-    Parquet,
     /// A recording with images, for viewers of MCAP files.
     Mcap,
     /// A video.
@@ -62,7 +59,6 @@ impl Format {
         Self::Npz,
         Self::Npy,
         Self::Csv,
-        Self::Parquet,
         Self::Mcap,
         #[cfg(feature = "pictures")]
         Self::Apng,
@@ -75,7 +71,6 @@ impl Format {
             Self::Npz => "npz",
             Self::Npy => "npy",
             Self::Csv => "csv",
-            Self::Parquet => "parquet",
             Self::Mcap => "mcap",
             #[cfg(feature = "pictures")]
             Self::Apng => "apng",
@@ -95,7 +90,7 @@ impl Format {
 
     /// Whether the file holds readings alone. A flat field corrects images, not readings.
     fn holds_readings(self) -> bool {
-        matches!(self, Self::Npz | Self::Npy | Self::Csv | Self::Parquet)
+        matches!(self, Self::Npz | Self::Npy | Self::Csv)
     }
 
     /// What a file of this format holds, in one line.
@@ -108,9 +103,6 @@ impl Format {
             }
             Self::Npy => "the readings of each frame alone, (F, M)",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
-            Self::Parquet => {
-                "the dataset: one frame a row, with set-up, time, serial, depth, truth"
-            }
             Self::Mcap => "the recording with images for Foxglove and Rerun, 30 a second at most",
             #[cfg(feature = "pictures")]
             Self::Apng => "a video of the reconstructed frames",
@@ -138,12 +130,6 @@ pub struct ExportOptions {
     pub keep_leak: bool,
     /// The detector to export. Without one, NPZ files have every detector, and other files detector 0.
     pub detector: Option<u8>,
-    /// What is known of the scene; a field of Parquet files.
-    pub scene: Option<String>,
-    /// Distance to the target in metres, if known; a field of Parquet files.
-    pub distance_m: Option<f64>,
-    /// An image of the scene as it is, `.npy` of shape (n, n); a field of Parquet files.
-    pub truth: Option<PathBuf>,
     /// The description of the camera: the geometry of the images and the place of depth maps in them,
     /// two channels of MCAP files.
     #[cfg(any(feature = "live", feature = "virtual-camera"))]
@@ -267,7 +253,6 @@ pub fn export(
         Format::Npz => arrays::npz(&whole, out, options.detector.is_none(), provenance)?,
         Format::Npy => arrays::npy(&whole, out, provenance)?,
         Format::Csv => arrays::csv(&whole, out, provenance)?,
-        Format::Parquet => parquet::write(&whole, out, options, provenance)?,
         Format::Mcap => images = mcap::write(&whole, out, options, provenance)?,
         #[cfg(feature = "pictures")]
         Format::Apng => images = video::apng(&whole, out, provenance)?,
@@ -286,7 +271,7 @@ pub fn export(
 }
 
 /// A recording that was read once: the mean of its frames, and the numbers and times of the frames.
-pub(crate) struct Whole {
+struct Whole {
     path: PathBuf,
     keep_leak: bool,
     /// The detector whose frames these are.
@@ -294,49 +279,27 @@ pub(crate) struct Whole {
     identity: CameraIdentity,
     setup: MeasurementSetup,
     /// The mean of all frames.
-    pub(crate) source: Source,
+    source: Source,
     sequence: Vec<i64>,
     device_time_us: Vec<i64>,
     time_ns: Vec<i64>,
 }
 
 /// One frame of a recording.
-pub(crate) struct OneFrame<'w> {
+struct OneFrame {
     /// Number of the frame in the recording.
-    pub(crate) index: usize,
-    run: u16,
-    sweeps: u32,
-    pub(crate) measurements: Measurements,
-    /// The newest depth map, in mm.
-    depth_mm: Option<&'w [u16]>,
+    index: usize,
+    measurements: Measurements,
 }
 
 impl Whole {
     /// Reads a recording at the detector that `options` choose.
-    pub(crate) fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
+    fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
         let mut recording = Recording::open(path)?;
         let detector = options.detector_of(path, &recording.identity)?;
         let (tally, mut numbers) = numbers_of(&mut recording)?;
         let numbers = numbers.remove(&detector).unwrap_or_default();
         Self::at(detector, numbers, path, options, &recording, &tally)
-    }
-
-    /// Reads a recording at the detector that `options` choose, or at each one. The file is read
-    /// once, whatever the number of detectors.
-    pub(crate) fn read_each(
-        path: &Path,
-        options: &SourceOptions,
-    ) -> Result<Vec<Self>, ExportError> {
-        if options.detector != Some(Index::All) {
-            return Ok(vec![Self::read(path, options)?]);
-        }
-        let mut recording = Recording::open(path)?;
-        let (tally, mut numbers) = numbers_of(&mut recording)?;
-        let at = |detector| {
-            let numbers = numbers.remove(&detector).unwrap_or_default();
-            Self::at(detector, numbers, path, options, &recording, &tally)
-        };
-        (0..recording.identity.detectors.max(1)).map(at).collect()
     }
 
     /// A recording of which every packet was heard, at one detector.
@@ -372,18 +335,14 @@ impl Whole {
     }
 
     /// Reads the frames one by one.
-    pub(crate) fn each(
+    fn each(
         &self,
-        mut on: impl FnMut(&OneFrame<'_>) -> Result<(), ExportError>,
+        mut on: impl FnMut(&OneFrame) -> Result<(), ExportError>,
     ) -> Result<(), ExportError> {
         let mut recording = Recording::open(&self.path)?;
         let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
-        let mut depth: Option<Vec<u16>> = None;
         let mut index = 0;
         hear_recording(&mut recording, |heard, _| {
-            if let Ok(DeviceMessage::Depth(Depth { distances_mm, .. })) = heard.content {
-                depth = Some(distances_mm.iter().collect());
-            }
             let Some(frame) = heard.frame_of(self.detector) else { return Ok(()) };
             if index == self.frames() || setup != self.setup {
                 return Err(ExportError::Changed(self.path.clone()));
@@ -391,13 +350,7 @@ impl Whole {
             let measurements = alone(frame, &setup)
                 .measurements_of(self.detector, &setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
-            on(&OneFrame {
-                index,
-                run: frame.run,
-                sweeps: frame.sweeps,
-                measurements,
-                depth_mm: depth.as_deref(),
-            })?;
+            on(&OneFrame { index, measurements })?;
             index += 1;
             Ok(())
         })?;
@@ -444,15 +397,6 @@ fn alone(frame: &Frame<'_>, setup: &MeasurementSetup) -> Integrated {
     alone
 }
 
-/// Reads an image of side `n` from a `.npy` file.
-fn read_truth(path: &Path, n: usize) -> Result<Vec<f32>, FileError> {
-    let stack = npy::read_stack(path)?;
-    if (stack.count, stack.height, stack.width) != (1, n, n) {
-        let found = format!("has shape ({}, {}, {})", stack.count, stack.height, stack.width);
-        return Err(FileError::field(path, "array", found, format!("one image, ({n}, {n})")));
-    }
-    Ok(stack.values)
-}
 /// The settings of the default method, with the shipped network where networks are built in, as those
 /// of `nirspi reconstruct`.
 fn settings() -> nirspi_recon::reconstruct::MethodSettings {

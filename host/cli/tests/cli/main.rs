@@ -5,7 +5,6 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests are tests
 
-mod archive;
 mod arguments;
 mod bad_files;
 mod bench;
@@ -19,6 +18,7 @@ mod doors;
 mod enhance;
 mod everyday;
 mod foreign_devices;
+mod many;
 mod metrics;
 mod other_forms;
 mod packaging;

@@ -36,12 +36,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/bring-up.md", "nirspi devices", "opens every serial port of this machine"),
     ("docs/browser.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
     ("docs/browser.md", "http.server", "runs until it is stopped; .ci/run web"),
-    ("docs/clusters.md", "reconstruct archive/", "the user's archive; tests/cli/archive.rs"),
-    (
-        "docs/clusters.md",
-        "nirspi dataset",
-        "8 s of a processor; tests/cli/archive.rs writes a smaller set",
-    ),
+    ("docs/clusters.md", "reconstruct archive/", "the user's archive; tests/cli/many.rs"),
     ("docs/clusters.md", "ray start", "needs Ray; .ci/run cluster"),
     ("docs/live-page.md", "curl", "needs the page of another terminal; tests/cli/serve.rs"),
     ("docs/mutants.md", "cargo mutants", "hours; .ci/run mutants"),
@@ -52,7 +47,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/quality.md", "metrics sharp.npy", "the user's stacks; tests/cli/metrics.rs"),
     ("docs/reliability.md", "serve_soak.py", "ten minutes; .ci/run crowd"),
     ("docs/several-cameras.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
-    ("docs/several-cameras.md", "benches/", "the user's archive; tests/cli/archive.rs"),
+    ("docs/several-cameras.md", "benches/", "the user's archive; tests/cli/many.rs"),
     ("docs/training.md", "python ", "needs torch and data of other groups"),
     (
         "docs/training.md",

@@ -1,21 +1,15 @@
 """Checks that other programs read what nirspi records and exports: the Python packages mcap,
-mcap-protobuf-support, pyarrow, DuckDB, pandas, datasets (Hugging Face), numpy and, where there is
-one, rerun.
+mcap-protobuf-support, numpy and, where there is one, rerun.
 
 Usage: check.py path/to/nirspi
 """
 
-import json
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-import datasets
-import duckdb
 import numpy as np
-import pandas as pd
-import pyarrow.parquet as pq
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -40,7 +34,7 @@ def messages(name):
 
 
 run("capture", "--frames", "12", "--sampling", "0.5", "--out", "rec.mcap")
-for kind in ("mcap", "npz", "npy", "csv", "parquet", "apng"):
+for kind in ("mcap", "npz", "npy", "csv", "apng"):
     run("export", "rec.mcap", "--to", kind, "--out", f"out.{kind}")
 run("reconstruct", "rec.mcap", "--out", "sum", "--no-flat-field")
 
@@ -75,38 +69,10 @@ print("schemas:", ", ".join(names))
 assert names[-1] == "nirspi.wire.v4" and summary.chunk_indexes
 assert summary.statistics.message_count >= len(wire)
 
-# The dataset.
-table = pq.read_table(folder / "out.parquet", page_checksum_verification=True)
 frames = np.load(folder / "out.npy")
 npz = np.load(folder / "out.npz")
-assert table.num_rows == 12 and frames.shape == (12, 512)
-assert np.array_equal(np.array(table["d"].to_pylist()), frames)
-assert np.array_equal(npz["frames"], frames)
-assert np.array_equal(np.array(table["rows"].to_pylist()), np.tile(npz["h_row"], (12, 1)))
-assert table["sequence"].to_pylist() == list(range(12))
-assert table["time"].cast("int64").to_pylist() == npz["time_ns"].tolist()
-assert set(table["simulated"].to_pylist()) == {True} and set(table["n"].to_pylist()) == {32}
-assert table["truth"].null_count == 12 and table["scene"].null_count == 12
-assert json.loads(table["meta"][0].as_py())["camera"]["board"] == "virtual"
-print("parquet:", ", ".join(f"{field.name} {field.type}" for field in table.schema))
-
-# The same numbers in DuckDB, pandas and Hugging Face's datasets.
-file = folder / "out.parquet"
-said = duckdb.sql(f"SELECT sequence, list_sum(d), n, board, simulated FROM '{file}' ORDER BY sequence").fetchall()
-assert [row[0] for row in said] == list(range(12)) and {row[2:] for row in said} == {(32, "virtual", True)}, said
-assert np.allclose([row[1] for row in said], frames.sum(axis=1), rtol=1e-12)
-assert np.array_equal(np.stack(pd.read_parquet(file)["d"].to_list()), frames)
-split = datasets.load_dataset("parquet", data_files=str(file), split="train", cache_dir=str(folder / "cache"))
-assert np.array_equal(np.array(split["d"]), frames) and split["sequence"][11] == 11
-print(f"parquet: the same {len(said)} frames in DuckDB, pandas and datasets")
-
-# With what is known of the scene.
-np.save(folder / "truth.npy", scaled)
-known = ("--scene", "letter R", "--distance-m", "0.3", "--truth", "truth.npy")
-run("export", "rec.mcap", "--to", "parquet", "--out", "known.parquet", *known)
-table = pq.read_table(folder / "known.parquet")
-assert np.array_equal(np.array(table["truth"].to_pylist(), "<f4")[3], scaled.ravel())
-assert set(table["scene"].to_pylist()) == {"letter R"} and set(table["distance_m"].to_pylist()) == {0.3}
+assert frames.shape == (12, 512) and np.array_equal(npz["frames"], frames)
+assert npz["sequence"].tolist() == list(range(12)) and npz["simulated"] == 1
 
 csv = np.genfromtxt(folder / "out.csv", delimiter=",", names=True, skip_header=2)
 assert np.array_equal(csv["d"], npz["d"]) and np.array_equal(csv["h_row"], npz["h_row"])

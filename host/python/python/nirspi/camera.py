@@ -270,6 +270,13 @@ class Camera:
         return np.asarray(self.setup["rows"], np.int64)
 
     @property
+    def truth(self) -> np.ndarray | None:
+        """What a perfect camera of 32 x 32 pixels would see of a virtual camera's scene, (32, 32) in
+        [0, 1]; None for any other camera."""
+        truth = self._camera.truth
+        return None if truth is None else truth.reshape(32, 32)
+
+    @property
     def status(self) -> dict[str, Any]:
         """The camera's state between two runs: ``state``, ``fault``, ``leds_on``, ``celsius``."""
         names = ("state", "fault", "leds_on", "celsius")

@@ -15,7 +15,6 @@ import nirspi as ns
 import nirspi.ray
 
 pytest.importorskip("ray")
-pq = pytest.importorskip("pyarrow.parquet")
 
 from nodes import alive, stop, two_nodes  # noqa: E402 - it needs Ray
 
@@ -49,12 +48,16 @@ def bare(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory):
+def files(tmp_path_factory):
     place = tmp_path_factory.mktemp("archive")
     random = np.random.default_rng(20261123)
     for k in range(24):
         ns.Measurement(d=random.normal(size=256), rows="zig-zag", n=16).save(place / f"{k:03}.npz")
-    return place
+    return sorted(place.glob("*.npz"))
+
+
+def image(path):
+    return np.asarray(ns.reconstruct(ns.load(path), method="hadamard"))
 
 
 def told_by(work):
@@ -74,26 +77,25 @@ def told_by(work):
     return found[0]
 
 
-def test_a_node_without_the_package_is_named_before_anything_is_written(bare, archive, tmp_path):
-    work = ns.Archive(archive, method="hadamard")
-    work.run(tmp_path / "alone.parquet")
+def test_a_node_without_the_package_is_named_before_anything_is_made(bare, files, tmp_path):
+    def noted(path):
+        (tmp_path / f"{path.name}.begun").touch()
+        return image(path)
+
     with two_nodes(tmp_path, second=bare) as second:
-        error = told_by(lambda: nirspi.ray.run(work, tmp_path / "parts", workers=2, items=4))
+        error = told_by(lambda: list(nirspi.ray.map(noted, files, workers=2, batch=4)))
         assert isinstance(error, ns.Error), error
         text = str(error)
         assert f"{bare} has no nirspi (ModuleNotFoundError: No module named 'nirspi')" in text, text
         assert text.endswith(f"expected {ns.__version__}: install the same package on every node"), text
         # The node that has the package is not named, and the text is one line.
         assert text.count("node ") == 1 and sys.executable not in text and "\n" not in text, text
-        assert not (tmp_path / "parts").exists()
+        assert not list(tmp_path.glob("*.begun"))
 
         stop(second)
         for _ in range(LONGEST_S):
             if len(alive()) == 1:
                 break
             threading.Event().wait(1)
-        report = told_by(lambda: nirspi.ray.run(work, tmp_path / "parts", workers=1, items=4))
-    assert report.rows == 24, report
-    parts = sorted((tmp_path / "parts").glob("part-*.parquet"))
-    rows = [row for part in parts for row in pq.read_table(part).to_pylist()]
-    assert rows == pq.read_table(tmp_path / "alone.parquet").to_pylist()
+        found = told_by(lambda: list(nirspi.ray.map(noted, files, workers=1, batch=4)))
+    assert [one.value.tobytes() for one in found] == [image(path).tobytes() for path in files]
