@@ -389,7 +389,6 @@ pub(crate) mod tests {
                 adc_bits: 14,
                 wavelength_nm: 1550,
                 capabilities: Vec::new(),
-                detectors: 1,
             };
             Taken::by(&camera).origin
         };

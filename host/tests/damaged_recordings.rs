@@ -35,7 +35,6 @@ fn recorded(folder: &Path) -> PathBuf {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: vec!["depth".into()],
-        detectors: 1,
     };
     let setup = MeasurementSetup::new(&Order::CakeCutting, 0.05).unwrap();
     let target = Target::New(path.clone());

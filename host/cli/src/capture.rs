@@ -149,7 +149,6 @@ fn say(args: &Args, report: &CaptureReport<'_>) -> Result<ExitCode> {
             Some(made) => print::line(format_args!("{frames}: {} made", count(made, "frame")))?,
             None => print::line(frames)?,
         }
-        report.further_words().iter().try_for_each(print::line)?;
         print::line(format_args!(
             "{:.0} frames/s over {:.2} s, {:.1} MB in {path}",
             report.frames_per_s,

@@ -25,9 +25,6 @@ pub struct Args {
     /// Do not correct the readings for the leak from pattern to pattern
     #[arg(long)]
     keep_leak: bool,
-    /// Detector of a camera that has several [default: every detector for npz, detector 0 otherwise]
-    #[arg(long, value_name = "N")]
-    detector: Option<u8>,
     /// mcap: also enhanced images, and the spread of each pixel if the scene were measured again (9 runs of the network each)
     #[arg(long)]
     enhance: bool,
@@ -41,7 +38,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let out = args.out.clone().unwrap_or_else(|| args.to.beside(&args.recording));
     let options = ExportOptions {
         keep_leak: args.keep_leak,
-        detector: args.detector,
         model: Some(args.model.read()?),
         enhance: args.enhance,
     };

@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = &args.matrix {
         return matrix::run(args, path);
     }
-    if [args.source.index, args.source.detector].contains(&Some(Index::All)) {
+    if args.source.index == Some(Index::All) {
         return stack::run(args, &first);
     }
     if args.warm_start {

@@ -30,23 +30,6 @@ def test_a_recording_holds_what_the_camera_gave(path):
     assert recording.cut_short is None
 
 
-def test_every_detector_of_a_camera_is_in_its_recording(tmp_path):
-    three = ns.CameraModel(toml="[detector]\nfurther_mm = [[150, 0], [0, -150]]")
-    path = tmp_path / "three.mcap"
-    with ns.Camera("virtual", model=three, sampling=0.25) as camera:
-        assert camera.detectors == 3
-        camera.record(path, frames=5)
-    recording = ns.Recording(path)
-    assert recording.detectors == 3 and recording.y.shape == (5, 256)
-    assert recording.measurement().d.shape == (256,)
-    each = recording.measurement(detector="all").d
-    assert each.shape == (3, 256)
-    assert (recording.measurement().d == each[0]).all()
-    assert (recording.measurement(detector=2).d == each[2]).all() and (each[1] != each[2]).any()
-    with pytest.raises(ns.Error, match="detector 3, expected 0 to 2"):
-        recording.measurement(detector=3)
-
-
 def test_the_frames_are_read_when_they_are_asked_for(path):
     recording = ns.Recording(path)
     assert "_frames" not in vars(recording)

@@ -8,7 +8,6 @@
 //! Frames are read one by one, so memory does not grow with the readings of a recording.
 
 mod arrays;
-mod detectors;
 #[cfg(feature = "enhance")]
 mod enhancing;
 mod mcap;
@@ -19,10 +18,9 @@ use crate::files::FileError;
 use crate::integrate::{IntegrateError, Integrated};
 use crate::provenance::Made;
 use crate::recording::{Recording, RecordingError};
-use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
-use crate::source::{self, Index, Source, SourceError, SourceOptions};
-use crate::tally::{Tally, hear_recording};
+use crate::source::{self, Source, SourceError, SourceOptions};
+use crate::tally::hear_recording;
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;
@@ -30,7 +28,6 @@ use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::words::count;
 use nirspi_wire::Frame;
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -97,10 +94,7 @@ impl Format {
     #[must_use]
     pub fn about(self) -> &'static str {
         match self {
-            Self::Npz => {
-                "n, h_row, d (mean of all frames), frames (F, M), sequence, times; of several detectors D: d \
-                 (D, M), frames (F, D, M)"
-            }
+            Self::Npz => "n, h_row, d (mean of all frames), frames (F, M), sequence, times",
             Self::Npy => "the readings of each frame alone, (F, M)",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
             Self::Mcap => "the recording with images for Foxglove and Rerun, 30 a second at most",
@@ -128,8 +122,6 @@ impl FromStr for Format {
 pub struct ExportOptions {
     /// Whether to leave the leak between patterns uncorrected.
     pub keep_leak: bool,
-    /// The detector to export. Without one, NPZ files have every detector, and other files detector 0.
-    pub detector: Option<u8>,
     /// The description of the camera: the geometry of the images and the place of depth maps in them,
     /// two channels of MCAP files.
     #[cfg(any(feature = "live", feature = "virtual-camera"))]
@@ -236,21 +228,12 @@ pub fn export(
     {
         return Err(ExportError::Itself(out.to_owned()));
     }
-    let source = SourceOptions {
-        keep_leak: options.keep_leak,
-        detector: match (options.detector, format) {
-            (Some(detector), _) => Some(Index::One(detector.into())),
-            // The file has every detector.
-            (None, Format::Npz) => Some(Index::One(0)),
-            (None, _) => None,
-        },
-        ..SourceOptions::default()
-    };
+    let source = SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
     let whole = Whole::read(input, &source)?;
     let provenance = &whole.source.taken.made(made);
     let mut images = 0;
     match format {
-        Format::Npz => arrays::npz(&whole, out, options.detector.is_none(), provenance)?,
+        Format::Npz => arrays::npz(&whole, out, provenance)?,
         Format::Npy => arrays::npy(&whole, out, provenance)?,
         Format::Csv => arrays::csv(&whole, out, provenance)?,
         Format::Mcap => images = mcap::write(&whole, out, options, provenance)?,
@@ -274,9 +257,6 @@ pub fn export(
 struct Whole {
     path: PathBuf,
     keep_leak: bool,
-    /// The detector whose frames these are.
-    detector: u8,
-    identity: CameraIdentity,
     setup: MeasurementSetup,
     /// The mean of all frames.
     source: Source,
@@ -293,32 +273,23 @@ struct OneFrame {
 }
 
 impl Whole {
-    /// Reads a recording at the detector that `options` choose.
+    /// Reads a recording.
     fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
         let mut recording = Recording::open(path)?;
-        let detector = options.detector_of(path, &recording.identity)?;
-        let (tally, mut numbers) = numbers_of(&mut recording)?;
-        let numbers = numbers.remove(&detector).unwrap_or_default();
-        Self::at(detector, numbers, path, options, &recording, &tally)
-    }
-
-    /// A recording of which every packet was heard, at one detector.
-    fn at(
-        detector: u8,
-        numbers: Numbers,
-        path: &Path,
-        options: &SourceOptions,
-        recording: &Recording,
-        tally: &Tally,
-    ) -> Result<Self, ExportError> {
-        let Numbers { sequence, device_time_us, time_ns } = numbers;
+        let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
+        let tally = hear_recording(&mut recording, |heard, tally| {
+            if let Some(frame) = heard.frame() {
+                sequence.push(tally.account().accounted() as i64 - 1);
+                device_time_us.push(frame.device_time_us as i64);
+                time_ns.push(heard.time_ns as i64);
+            }
+            Ok::<(), RecordingError>(())
+        })?;
         Ok(Self {
             path: path.to_owned(),
             keep_leak: options.keep_leak,
-            detector,
-            identity: recording.identity.clone(),
             setup: recording.setup.clone(),
-            source: source::of_sum(path, options, recording, detector, tally)?,
+            source: source::of_sum(path, options, &recording, &tally)?,
             sequence,
             device_time_us,
             time_ns,
@@ -343,12 +314,12 @@ impl Whole {
         let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
         let mut index = 0;
         hear_recording(&mut recording, |heard, _| {
-            let Some(frame) = heard.frame_of(self.detector) else { return Ok(()) };
+            let Some(frame) = heard.frame() else { return Ok(()) };
             if index == self.frames() || setup != self.setup {
                 return Err(ExportError::Changed(self.path.clone()));
             }
             let measurements = alone(frame, &setup)
-                .measurements_of(self.detector, &setup, settling.as_ref(), self.keep_leak)
+                .measurements(&setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
             on(&OneFrame { index, measurements })?;
             index += 1;
@@ -360,35 +331,6 @@ impl Whole {
     fn integrate(&self, problem: IntegrateError) -> ExportError {
         SourceError::Integrate { path: self.path.clone(), problem }.into()
     }
-}
-
-/// The numbers and times of the frames of one detector.
-#[derive(Default)]
-struct Numbers {
-    sequence: Vec<i64>,
-    device_time_us: Vec<i64>,
-    time_ns: Vec<i64>,
-}
-
-/// The account of a recording, and the numbers and times of the frames of each detector.
-fn numbers_of(recording: &mut Recording) -> Result<(Tally, BTreeMap<u8, Numbers>), RecordingError> {
-    let mut numbers: BTreeMap<u8, Numbers> = BTreeMap::new();
-    let tally = hear_recording(recording, |heard, tally| {
-        if let Some((detector, frame)) = heard.any_frame() {
-            let numbers = numbers.entry(detector).or_default();
-            numbers.sequence.push(number_of(tally, detector));
-            numbers.device_time_us.push(frame.device_time_us as i64);
-            numbers.time_ns.push(heard.time_ns as i64);
-        }
-        Ok::<(), RecordingError>(())
-    })?;
-    Ok((tally, numbers))
-}
-
-/// The number of the newest frame of this detector that arrived in order.
-fn number_of(tally: &Tally, detector: u8) -> i64 {
-    let (_, account) = tally.detector(detector).unwrap_or((tally.integrated(), tally.account()));
-    account.accounted() as i64 - 1
 }
 
 fn alone(frame: &Frame<'_>, setup: &MeasurementSetup) -> Integrated {

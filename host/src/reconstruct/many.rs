@@ -130,7 +130,7 @@ fn images_of(
     let is_one = match options.index {
         Some(Index::One(_)) => true,
         Some(Index::All) => false,
-        None => options.fits_recording(file)? && options.detector != Some(Index::All),
+        None => options.fits_recording(file)?,
     };
     let sources = match is_one {
         true => vec![Source::read(file, options)?],

@@ -4,8 +4,8 @@ use super::Recorded;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{
-    Capabilities, Channel, ConfigField, ConfigProblem, Configuration, Identity, SIDE, State,
-    Status, Tail, Version,
+    Capabilities, ConfigField, ConfigProblem, Configuration, Identity, SIDE, State, Status, Tail,
+    Version,
 };
 
 /// The identity of the recorded camera in the wire's form.
@@ -25,7 +25,6 @@ pub(super) fn identity(camera: &CameraIdentity) -> Identity<'_> {
         adc_bits: camera.adc_bits,
         wavelength_nm: camera.wavelength_nm,
         capabilities: Tail(is_newer.then_some(capabilities)),
-        detectors: Tail((camera.protocol >= Channel::SINCE).then_some(camera.detectors)),
     }
 }
 

@@ -135,11 +135,6 @@ impl CameraLog {
         self.enter(Phase::Preparing, "preparing: latency and settling are measured".to_owned());
         self.camera.said.status = None;
         self.event(Level::Info, format!("connected to {} {}", identity.board, identity.serial));
-        let detectors = identity.detectors;
-        if detectors > 1 {
-            let text = format!("the camera has {detectors} detectors: images are of detector 0");
-            self.event(Level::Info, text);
-        }
     }
 
     /// Records that frames arrive from now on.
@@ -192,7 +187,6 @@ mod tests {
             adc_bits: 1,
             wavelength_nm: 1,
             capabilities: Vec::new(),
-            detectors: 1,
         };
         let mut log = CameraLog::new("test", &identity);
         for number in 1..=3 * EVENTS {

@@ -15,7 +15,7 @@ use nirspi::imaging::{
 use nirspi::picture::{Pictures, Unit};
 use nirspi::provenance::Provenance;
 use nirspi::reconstruct::{Skipped, check_finite, losses};
-use nirspi::source::{FirstPatterns, Index, OutlierReport};
+use nirspi::source::{FirstPatterns, OutlierReport};
 use nirspi_nets::Device;
 use nirspi_recon::reconstruct::{Method, Reconstruct, Reconstruction, Setting, Stacked};
 use nirspi_recon::words::count_of;
@@ -210,7 +210,7 @@ fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> 
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     let warm = report.frames.iter().filter(|frame| frame.warm).count();
-    let what = if args.source.detector == Some(Index::All) { "detector" } else { "frame" };
+    let what = "frame";
     print::line(format_args!(
         "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.3} ms a {what}",
         report.input.display(),

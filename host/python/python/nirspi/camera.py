@@ -255,11 +255,6 @@ class Camera:
         return json.loads(self._camera.identity)
 
     @property
-    def detectors(self) -> int:
-        """Number of detectors. Frames are those of detector 0; a recording has those of every detector."""
-        return int(self.identity["detectors"])
-
-    @property
     def setup(self) -> dict[str, Any]:
         """The measurement: order, rows, timing."""
         return json.loads(self._camera.setup)

@@ -112,15 +112,10 @@ class Recording:
         """Flags of each frame, see :class:`Frame`, (F,)."""
         return self._frames["flags"]
 
-    @property
-    def detectors(self) -> int:
-        """Number of detectors of the recorded camera. The frames above are those of detector 0."""
-        return int(self.identity["detectors"])
-
     def measurement(self, **options: Any) -> Measurement:
         """The measurement of all frames together: :func:`nirspi.load` of this file.
 
-        ``index="all"`` gives one measurement a frame, ``detector="all"`` one a detector.
+        ``index="all"`` gives one measurement a frame.
         """
         return load(self.path, **options)
 
