@@ -79,10 +79,11 @@ fn run(
     train(settings, &examples, "procedural", resumed, &Device::cpu(), keeper)
 }
 
-/// Ten pages with a small square or a large one: two classes that are easy to distinguish.
+/// Ten pages with a small square or a large one: two classes that are easy to distinguish. No page is there
+/// twice, because families that share one would be one family.
 fn squares() -> Scenes {
     let page = |number: usize| -> Vec<u8> {
-        let half = if number.is_multiple_of(2) { 4 } else { 20 } + number / 4;
+        let half = if number.is_multiple_of(2) { 4 } else { 20 } + number / 2;
         let lit = |at: usize| (at / 64).abs_diff(32).max((at % 64).abs_diff(32)) < half;
         (0..AREA_PX).map(|at| if lit(at) { 255 } else { 0 }).collect()
     };

@@ -4,13 +4,14 @@
 //! A prediction is compared only with readings that it was not made from.
 
 use super::selection::Miss;
-use crate::Rows;
+use crate::{Rows, order};
 
 /// How well readings are predicted by the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldBack {
     /// Absolute and squared error of the predictions, each relative to that of zero filling: 2 is as
-    /// bad as zero filling, 0 is perfect.
+    /// bad as zero filling, 0 is perfect. Where patterns were left out it is that of the finer half
+    /// of the measured patterns, which are the nearest to those that were left out.
     pub miss: f64,
     /// Share of the readings' variation (squares, without the all-ones pattern) that the predictions
     /// explain, 0 to 1.
@@ -27,24 +28,34 @@ impl HeldBack {
     pub const BY_CHANCE: f64 = 3.0;
 
     /// Judges predictions, one for each reading. `trust` is the factor that the picture uses them
-    /// with. `None` if there are no readings beside the all-ones pattern's, or all are 0.
+    /// with. `None` if there are no readings beside the all-ones pattern's, or all of those that
+    /// [`Self::miss`] counts are 0.
     pub(super) fn of(rows: &Rows, values: &[f32], predicted: &[f32], trust: f32) -> Option<Self> {
+        let positions = order::positions_by_sequency(rows);
         let (mut miss, mut zero) = (Miss::default(), Miss::default());
+        let (mut finer_miss, mut finer_zero) = (Miss::default(), Miss::default());
         let (mut signs, mut squares) = (0.0, 0.0);
-        let readings = rows.iter().zip(values).zip(predicted).filter(|((row, _), _)| **row != 0);
-        for ((_, &value), &predicted) in readings {
-            let (value, predicted) = (f64::from(value), f64::from(predicted));
-            miss.add(Miss::of(value - f64::from(trust) * predicted));
-            zero.add(Miss::of(value));
+        let left_out = rows.len() < rows.side().area();
+        let first_finer = if left_out { positions.len() / 2 } else { 0 };
+        for (at, &k) in positions.iter().enumerate() {
+            let (value, predicted) = (f64::from(values[k]), f64::from(predicted[k]));
+            let (missed, unpredicted) =
+                (Miss::of(value - f64::from(trust) * predicted), Miss::of(value));
+            miss.add(missed);
+            zero.add(unpredicted);
+            if at >= first_finer {
+                finer_miss.add(missed);
+                finer_zero.add(unpredicted);
+            }
             let both = value * predicted;
             signs += both.signum() * both.abs().sqrt();
             squares += both.abs();
         }
-        if zero.squared() <= 0.0 {
+        if finer_zero.squared() <= 0.0 {
             return None;
         }
         Some(Self {
-            miss: miss.relative_to(zero),
+            miss: finer_miss.relative_to(finer_zero),
             confirmed: (1.0 - miss.squared() / zero.squared()).clamp(0.0, 1.0),
             score: if squares > 0.0 { signs / squares.sqrt() } else { 0.0 },
         })
@@ -60,6 +71,7 @@ impl HeldBack {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Order;
     use crate::testing::{normal, side};
     use rand::SeedableRng;
     use rand_pcg::Pcg64;
@@ -77,6 +89,26 @@ mod tests {
         // The score is of the prediction itself, the miss of what the picture uses of it.
         let half = HeldBack::of(&rows, &values, &values, 0.5).unwrap();
         assert_eq!((half.miss, half.score), (0.75, perfect.score));
+    }
+
+    #[test]
+    fn the_finer_half_counts_where_patterns_were_left_out() {
+        // Two coarse rows are predicted, two fine ones are not.
+        let zig_zag: Vec<i64> =
+            Order::ZigZag.rows(side(4)).unwrap().iter().map(|&row| row.into()).collect();
+        let predicted = [9.0, 4.0, 3.0, 0.0, 0.0];
+        let values = [9.0, 4.0, 3.0, 2.0, 1.0];
+        let some = Rows::new(side(4), zig_zag[..5].to_vec()).unwrap();
+        let found = HeldBack::of(&some, &values, &predicted, 1.0).unwrap();
+        assert_eq!((found.miss, found.confirmed), (2.0, 1.0 - 5.0 / 30.0));
+        // Of all patterns, each counts.
+        let mut values = values.to_vec();
+        let mut predicted = predicted.to_vec();
+        values.resize(16, 0.0);
+        predicted.resize(16, 0.0);
+        let all = Rows::new(side(4), zig_zag).unwrap();
+        let found = HeldBack::of(&all, &values, &predicted, 1.0).unwrap();
+        assert!((found.miss - (3.0 / 10.0 + 5.0 / 30.0)).abs() < 1e-12, "{found:?}");
     }
 
     #[test]
