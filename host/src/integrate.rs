@@ -127,22 +127,6 @@ impl Integrated {
         settling: Option<&Settling>,
         keep_leak: bool,
     ) -> Result<Measurements, IntegrateError> {
-        self.measurements_of(0, setup, settling, keep_leak)
-    }
-
-    /// As [`measurements`](Self::measurements), for the sums of this detector. The response is measured at
-    /// detector 0. Detectors of one type have the same leak, but each one its own dark level, which is
-    /// estimated for the further ones.
-    ///
-    /// # Errors
-    /// As [`measurements`](Self::measurements).
-    pub fn measurements_of(
-        &self,
-        detector: u8,
-        setup: &MeasurementSetup,
-        settling: Option<&Settling>,
-        keep_leak: bool,
-    ) -> Result<Measurements, IntegrateError> {
         let mut values = self.means(setup);
         let leak = settling
             .filter(|_| !keep_leak)
@@ -156,7 +140,7 @@ impl Integrated {
             let measurements = Measurements::from_differential(&setup.rows, &values)?;
             return with_noise(measurements, noise);
         }
-        let dark = settling.filter(|_| detector == 0).map(|settling| settling.dark_counts);
+        let dark = settling.map(|settling| settling.dark_counts);
         values.iter_mut().for_each(|value| *value -= dark.unwrap_or(0.0));
         if let Some(leak) = &leak {
             leak.correct_single(&mut values, Sweep::Repeating);

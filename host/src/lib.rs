@@ -12,13 +12,11 @@
 //!   camera,
 //! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
 //!   programs, [`replay`] plays it back as a camera,
-//! * [`relay`] gives the frames of a camera to other programs,
-//! * [`sync`] brings frames of several cameras into one time and order,
+//! * [`frame_time`] gives the frames of a camera times by this computer's clock,
 //! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
 //!   from measurements,
 //! * [`source`] reads measurements from a file, a recording or a capture,
-//! * [`reconstruct`] makes an image or many of what was read, [`archive`] one table of a whole folder,
-//!   whose columns are in [`dataset`],
+//! * [`reconstruct`] makes an image or many of what was read,
 //! * [`files`], [`picture`] and [`scene`] read and write what users see, [`resolution`] measures
 //!   the finest detail, [`legibility`] reads characters,
 //! * [`imaging`] scales, enhances and judges images, and gives warnings,
@@ -45,15 +43,11 @@
 
 pub mod about;
 pub mod account;
-#[cfg(not(target_family = "wasm"))]
-pub mod archive;
 pub mod boards;
 pub mod calibration;
 pub mod capture;
 pub mod causes;
 pub mod clock;
-#[cfg(not(target_family = "wasm"))]
-pub mod dataset;
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 mod depth_image;
 #[cfg(not(target_family = "wasm"))]
@@ -68,6 +62,7 @@ pub mod files;
 #[cfg(feature = "flash")]
 pub mod flash;
 pub mod fpga;
+pub mod frame_time;
 pub mod gateware;
 pub mod heartbeat;
 pub mod imaging;
@@ -76,16 +71,12 @@ pub mod integrate;
 #[cfg(feature = "training")]
 pub mod legibility;
 pub mod link;
-#[cfg(not(target_family = "wasm"))]
-mod parquet;
 #[cfg(feature = "pictures")]
 pub mod picture;
 pub mod provenance;
 #[cfg(not(target_family = "wasm"))]
 pub mod reconstruct;
 pub mod recording;
-#[cfg(not(target_family = "wasm"))]
-pub mod relay;
 pub mod replay;
 pub mod resolution;
 #[cfg(feature = "virtual-camera")]
@@ -101,7 +92,6 @@ pub mod signal;
 #[cfg(not(target_family = "wasm"))]
 pub mod source;
 pub mod stage_times;
-pub mod sync;
 pub mod tally;
 #[cfg(feature = "training")]
 pub mod training;

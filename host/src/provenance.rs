@@ -389,7 +389,6 @@ pub(crate) mod tests {
                 adc_bits: 14,
                 wavelength_nm: 1550,
                 capabilities: Vec::new(),
-                detectors: 1,
             };
             Taken::by(&camera).origin
         };
@@ -422,8 +421,8 @@ pub(crate) mod tests {
                 &["nirspi", "x", "http://h:1/?token=abc&a=1"],
                 "nirspi x 'http://h:1/?token=hidden&a=1'",
             ),
-            (&["nirspi", "s3://me:abc@host/b"], "nirspi s3://hidden@host/b"),
-            (&["nirspi", "zenoh:lab@tcp/host:7447"], "nirspi zenoh:lab@tcp/host:7447"),
+            (&["nirspi", "http://me:abc@host/b"], "nirspi http://hidden@host/b"),
+            (&["nirspi", "tcp:lab@host:7447"], "nirspi tcp:lab@host:7447"),
             (&["nirspi", "--scene", "word:A B", ""], "nirspi --scene 'word:A B' ''"),
             (&["nirspi", "it's"], r"nirspi 'it'\''s'"),
         ] {

@@ -52,13 +52,6 @@ pub struct CameraIdentity {
     /// does not report capabilities.
     #[serde(default)]
     pub capabilities: Vec<String>,
-    /// Number of detectors; 1 for a camera of a protocol version before 3, which sends detector 0 alone.
-    #[serde(default = "one")]
-    pub detectors: u8,
-}
-
-fn one() -> u8 {
-    1
 }
 
 impl From<&Identity<'_>> for CameraIdentity {
@@ -73,9 +66,6 @@ impl From<&Identity<'_>> for CameraIdentity {
             adc_bits: identity.adc_bits,
             wavelength_nm: identity.wavelength_nm,
             capabilities: in_words(identity.capabilities.0.unwrap_or_default()),
-            // A camera that sends frames has a detector, so 0 is read as 1: refusing the camera would also refuse
-            // the commands that flash its firmware.
-            detectors: identity.detectors.0.unwrap_or(1).max(1),
         }
     }
 }

@@ -8,16 +8,13 @@ use crate::files::measurement::{self, Form, MeasurementFile, Readings, Reference
 use crate::integrate::IntegrateError;
 use crate::provenance::Taken;
 use crate::recording::RecordingError;
-use crate::session::CameraIdentity;
 use crate::tally::Misfit;
 use nirspi_recon::law::{self, Doubt, Reading};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{
-    Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, Side,
-    reconstruct,
+    Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, reconstruct,
 };
 use serde::Serialize;
-use serde_json::{Value, json};
 use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -29,7 +26,7 @@ mod recording;
 mod several;
 
 pub(crate) use recording::of_sum;
-use recording::{detectors_of_recording, frames_of_recording, from_recording};
+use recording::{frames_of_recording, from_recording};
 pub use several::Several;
 
 /// How to read measurements.
@@ -38,8 +35,6 @@ pub struct SourceOptions {
     /// The measurement in a file that holds several. For a recording, `All` gives each frame and
     /// any other choice gives their sum.
     pub index: Option<Index>,
-    /// The detector of a recording. `None` is detector 0. `All` gives the sum of the frames of each detector.
-    pub detector: Option<Index>,
     /// What a measurement file does not state itself; its `index` is ignored.
     pub file: Selection,
     /// The part of complex readings to use.
@@ -227,46 +222,15 @@ pub enum SourceError {
         most: u64,
     },
     /// The choice is of several measurements, but one is needed.
-    #[error("--{0} all, expected one measurement here")]
-    One(&'static str),
-    /// The recorded camera has no such detector.
-    #[error("{}: detector {asked}, expected 0 to {} of the recorded camera", .path.display(), .detectors - 1)]
-    Detector {
-        /// The recording.
-        path: PathBuf,
-        /// The detector that was asked for.
-        asked: usize,
-        /// Number of detectors of the camera.
-        detectors: u8,
-    },
-    /// No frame of a further detector arrived.
-    #[error("{}: no intact frame of detector {detector} in the recording, expected at least one", .path.display())]
-    NoFrameOf {
-        /// The recording.
-        path: PathBuf,
-        /// The detector.
-        detector: u8,
-    },
-    /// A choice of the detector for a measurement file.
-    #[error(
-        "--detector belongs to recordings, not to measurement files: --index chooses from the detectors of a file"
-    )]
-    DetectorOfFile,
-    /// All frames of all detectors.
-    #[error(
-        "--index all and --detector all, expected one of them: --index all --detector N gives the frames of detector N"
-    )]
-    AllOfAll,
+    #[error("--index all, expected one measurement here")]
+    One,
 }
 
 impl SourceError {
     /// Whether options contradict each other or the kind of the file.
     #[must_use]
     pub fn is_of_options(&self) -> bool {
-        matches!(
-            self,
-            Self::NotForRecordings | Self::One(_) | Self::DetectorOfFile | Self::AllOfAll
-        )
+        matches!(self, Self::NotForRecordings | Self::One)
     }
 }
 
@@ -326,18 +290,13 @@ impl Source {
         from_file(path, measurement::read(path, &want)?, options.part)
     }
 
-    /// Reads all measurements of a file, each frame of a recording, or with [`SourceOptions::detector`] `All` the sum
-    /// of a recording's frames at each detector.
+    /// Reads all measurements of a file, or each frame of a recording.
     ///
     /// # Errors
     /// As [`read`](Self::read).
     pub fn read_all(path: &Path, options: &SourceOptions) -> Result<Vec<Self>, SourceError> {
         if options.fits_recording(path)? {
-            return match (options.detector, options.index) {
-                (Some(Index::All), Some(Index::All)) => Err(SourceError::AllOfAll),
-                (Some(Index::All), _) => detectors_of_recording(path, options),
-                _ => frames_of_recording(path, options),
-            };
+            return frames_of_recording(path, options);
         }
         Several::open(path, options)?.each()
     }
@@ -362,7 +321,6 @@ impl Source {
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
         notes.extend(capture.missing().as_deref().map(not_whole));
-        notes.extend(first_of(1 + capture.further.len()));
         let read = of_frames(integrated.measurements(setup, settling.as_ref(), false)?)?;
         Ok(Self {
             measurements: read.measurements,
@@ -390,15 +348,6 @@ fn of_frames(measurements: Measurements) -> Result<Reading, MeasurementError> {
     Ok(read)
 }
 
-/// A note that a camera has further detectors.
-fn first_of(detectors: usize) -> Option<String> {
-    (detectors > 1).then(|| {
-        format!(
-            "detector 0 of {detectors}: --detector N gives another one of the recording, --detector all each of them"
-        )
-    })
-}
-
 /// A note about what a capture lacks. The text may come from a file.
 fn not_whole(missing: &str) -> String {
     format!("the recording is not whole: {}", missing.escape_debug())
@@ -407,42 +356,6 @@ fn not_whole(missing: &str) -> String {
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
 
 impl SourceOptions {
-    /// The options as data, for keys: each option by its name (`key::the_key_of_options_is_frozen`).
-    #[must_use]
-    pub fn key(&self) -> Value {
-        let Self { index, detector, file, part, keep_leak, no_flat_field } = self;
-        // The index of a file is that of these options.
-        let Selection {
-            index: _,
-            form,
-            field,
-            patterns_first,
-            side,
-            shown,
-            transpose,
-            decimal_comma,
-        } = file;
-        let of_index = |index: &Option<Index>| match index {
-            None => Value::Null,
-            Some(Index::One(index)) => (*index).into(),
-            Some(Index::All) => "all".into(),
-        };
-        json!({
-            "index": of_index(index),
-            "detector": of_index(detector),
-            "form": form.map(Form::name),
-            "field": field,
-            "patterns_first": patterns_first,
-            "side": side.map(Side::pixels),
-            "shown": shown.as_ref().map(Order::to_string),
-            "transpose": transpose,
-            "decimal_comma": decimal_comma,
-            "part": part.name(),
-            "keep_leak": keep_leak,
-            "no_flat_field": no_flat_field,
-        })
-    }
-
     /// The requested index.
     ///
     /// # Errors
@@ -451,24 +364,7 @@ impl SourceOptions {
         match self.index {
             None => Ok(None),
             Some(Index::One(index)) => Ok(Some(index)),
-            Some(Index::All) => Err(SourceError::One("index")),
-        }
-    }
-
-    /// The requested detector of a recorded camera.
-    pub(crate) fn detector_of(
-        &self,
-        path: &Path,
-        identity: &CameraIdentity,
-    ) -> Result<u8, SourceError> {
-        let detectors = identity.detectors.max(1);
-        match self.detector {
-            None => Ok(0),
-            Some(Index::All) => Err(SourceError::One("detector")),
-            Some(Index::One(asked)) => u8::try_from(asked)
-                .ok()
-                .filter(|&found| found < detectors)
-                .ok_or_else(|| SourceError::Detector { path: path.to_owned(), asked, detectors }),
+            Some(Index::All) => Err(SourceError::One),
         }
     }
 
@@ -486,9 +382,6 @@ impl SourceOptions {
         let for_files = self.file != Selection::default() || self.part != Part::default();
         if (is_mcap || named_mcap) && (one || for_files) {
             return Err(SourceError::NotForRecordings);
-        }
-        if !is_mcap && !named_mcap && self.detector.is_some() {
-            return Err(SourceError::DetectorOfFile);
         }
         Ok(is_mcap || named_mcap)
     }
@@ -620,36 +513,6 @@ fn as_they_are(rows: &Rows, readings: &Readings) -> Result<Reading, MeasurementE
     };
     let (dropouts, outliers, doubts) = (Vec::new(), Vec::new(), Vec::new());
     Ok(Reading { measurements, dropouts, outliers, doubts, dark_level })
-}
-
-#[cfg(test)]
-mod key {
-    use super::*;
-
-    #[test]
-    fn the_key_of_options_is_frozen() {
-        let options = SourceOptions {
-            index: Some(Index::All),
-            file: Selection { form: Some(Form::Halves), ..Selection::default() },
-            part: Part::Real,
-            ..SourceOptions::default()
-        };
-        let frozen = json!({
-            "index": "all",
-            "detector": null,
-            "form": "halves",
-            "field": null,
-            "patterns_first": false,
-            "side": null,
-            "shown": null,
-            "transpose": false,
-            "decimal_comma": false,
-            "part": "real",
-            "keep_leak": false,
-            "no_flat_field": false,
-        });
-        assert_eq!(options.key(), frozen);
-    }
 }
 
 #[cfg(all(test, feature = "training"))]

@@ -3,7 +3,7 @@
 //!
 //! A recording gives the same tally as the capture that made it.
 
-use crate::account::{Arrival, Damage, LossAccount};
+use crate::account::{Arrival, LossAccount};
 use crate::integrate::Integrated;
 use crate::recording::{Recording, RecordingError};
 use crate::setup::MeasurementSetup;
@@ -25,19 +25,6 @@ pub struct Tally {
     device_time_us: u64,
     /// Number of intact messages of a newer protocol version.
     unknown: u64,
-    /// The detectors beside the first one: detector 1, 2, ...
-    further: Vec<DetectorTally>,
-    /// Damaged packets that belong to no gap of any detector yet.
-    damage: Damage,
-}
-
-/// The sum and the account of a further detector of the camera.
-#[derive(Debug, Clone)]
-pub struct DetectorTally {
-    /// The account of its frames.
-    pub account: LossAccount,
-    /// The sum of its frames received in order.
-    pub integrated: Integrated,
 }
 
 /// How an intact frame contradicts the setup.
@@ -60,14 +47,6 @@ pub enum Misfit {
     Differential {
         /// Whether the frame has differences.
         differential: bool,
-    },
-    /// The camera said that it has fewer detectors.
-    #[error("a frame of detector {detector}, expected detectors 0 to {} of this camera", .detectors - 1)]
-    Detector {
-        /// The frame's detector.
-        detector: u8,
-        /// Number of detectors of the camera.
-        detectors: usize,
     },
     /// The frame sums no sweep, so its samples are not measurements.
     #[error("frames of 0 sweeps, expected at least 1")]
@@ -92,29 +71,13 @@ impl Tally {
             said: None,
             device_time_us: 0,
             unknown: 0,
-            further: Vec::new(),
-            damage: Damage::default(),
         }
     }
 
-    /// The same tally of a camera with this many detectors. Every frame that the camera made is then accounted
-    /// for at each of them.
-    #[must_use]
-    pub fn with_detectors(mut self, detectors: u8) -> Self {
-        let further = DetectorTally {
-            account: LossAccount::new(),
-            integrated: Integrated::of_patterns(self.integrated.patterns()),
-        };
-        self.further = vec![further; usize::from(detectors).saturating_sub(1)];
-        self
-    }
-
-    /// Counts a packet. Returns whether the packet was a frame that was added to the sum of its detector.
+    /// Counts a packet. Returns whether the packet was a frame that was added to the sum.
     pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
         match content {
-            Ok(message) if let Some((detector, frame)) = message.frame() => {
-                return self.frame(detector, frame);
-            }
+            Ok(DeviceMessage::Frame(frame)) => return self.frame(frame),
             Ok(DeviceMessage::Event(event)) => match event.kind {
                 EventKind::RunEnded { run, frames_made, .. }
                     if self.run.is_none_or(|own| own == run) =>
@@ -130,7 +93,7 @@ impl Tally {
         false
     }
 
-    fn frame(&mut self, detector: u8, frame: &Frame<'_>) -> bool {
+    fn frame(&mut self, frame: &Frame<'_>) -> bool {
         if *self.run.get_or_insert(frame.run) != frame.run {
             return false;
         }
@@ -141,25 +104,9 @@ impl Tally {
             self.account.damaged();
             return false;
         }
-        let detectors = 1 + self.further.len();
-        self.damage.add(self.account.take_damaged());
-        let of_further = usize::from(detector).checked_sub(1);
-        let (account, integrated) = match of_further.map(|at| self.further.get_mut(at)) {
-            None => (&mut self.account, &mut self.integrated),
-            Some(Some(found)) => (&mut found.account, &mut found.integrated),
-            Some(None) => {
-                self.misfit.get_or_insert(Misfit::Detector { detector, detectors });
-                self.account.damaged();
-                return false;
-            }
-        };
-        let (arrival, taken) =
-            account.lend(self.damage.total(), |account| account.frame(frame.sequence));
-        self.damage.take(taken);
-        let received = arrival == Arrival::Received;
+        let received = self.account.frame(frame.sequence) == Arrival::Received;
         if received {
-            self.damage.frame_arrived(detectors);
-            integrated.add(frame);
+            self.integrated.add(frame);
         }
         received
     }
@@ -178,13 +125,7 @@ impl Tally {
 
     /// Records the end of the run and the number of frames that the camera reported.
     pub fn end(&mut self, frames_made: u32) {
-        self.damage.add(self.account.take_damaged());
-        let further = self.further.iter_mut().map(|further| &mut further.account);
-        for account in std::iter::once(&mut self.account).chain(further) {
-            let ((), taken) =
-                account.lend(self.damage.total(), |account| account.made(frames_made));
-            self.damage.take(taken);
-        }
+        self.account.made(frames_made);
         self.said = Some(frames_made);
     }
 
@@ -226,29 +167,10 @@ impl Tally {
         &self.account
     }
 
-    /// The further detectors, detector 1 first.
-    #[must_use]
-    pub fn further(&self) -> &[DetectorTally] {
-        &self.further
-    }
-
-    /// The sum and the account of a detector; `None` if the camera has no such detector.
-    #[must_use]
-    pub fn detector(&self, detector: u8) -> Option<(&Integrated, &LossAccount)> {
-        let Some(at) = usize::from(detector).checked_sub(1) else {
-            return Some((&self.integrated, &self.account));
-        };
-        self.further.get(at).map(|further| (&further.integrated, &further.account))
-    }
-
-    /// Frames of all detectors that arrived, in order or late.
+    /// Frames that arrived, in order or late.
     pub(crate) fn arrived(&self) -> u64 {
-        let further = self.further.iter().map(|further| &further.account);
-        let arrived = |account: &LossAccount| {
-            let counters = account.counters();
-            counters.received + counters.late
-        };
-        std::iter::once(&self.account).chain(further).map(arrived).sum()
+        let counters = self.account.counters();
+        counters.received + counters.late
     }
 
     /// Number of intact messages that this program does not know. The messages are skipped, because
@@ -279,22 +201,13 @@ pub struct Heard<'p> {
 }
 
 impl Heard<'_> {
-    /// The frame of detector 0 that arrived in order; `None` for any other packet.
+    /// The frame that arrived in order; `None` for any other packet.
     #[must_use]
     pub fn frame(&self) -> Option<&Frame<'_>> {
-        self.frame_of(0)
-    }
-
-    /// The frame of this detector that arrived in order; `None` for any other packet.
-    #[must_use]
-    pub fn frame_of(&self, detector: u8) -> Option<&Frame<'_>> {
-        self.any_frame().filter(|(found, _)| *found == detector).map(|(_, frame)| frame)
-    }
-
-    /// The frame of any detector that arrived in order, with the number of its detector.
-    #[must_use]
-    pub fn any_frame(&self) -> Option<(u8, &Frame<'_>)> {
-        self.content.as_ref().ok()?.frame().filter(|_| self.counts)
+        match self.content {
+            Ok(DeviceMessage::Frame(frame)) if self.counts => Some(frame),
+            _ => None,
+        }
     }
 }
 
@@ -307,8 +220,7 @@ pub fn hear_recording<E: From<RecordingError>>(
     recording: &mut Recording,
     mut hear: impl FnMut(&Heard<'_>, &Tally) -> Result<(), E>,
 ) -> Result<Tally, E> {
-    let mut tally =
-        Tally::new(&recording.setup, recording.run).with_detectors(recording.identity.detectors);
+    let mut tally = Tally::new(&recording.setup, recording.run);
     let mut scratch = Vec::new();
     for packet in recording {
         let packet = packet?;
@@ -330,20 +242,19 @@ pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingErro
     hear_recording(recording, |_, _| Ok(()))
 }
 
-/// The sum of each frame of a detector that arrived in order, and the account of all frames of the recording. `fits`
+/// The sum of each frame that arrived in order, and the account of all frames of the recording. `fits`
 /// is asked for each number of frames before they are kept.
 ///
 /// # Errors
 /// [`RecordingError`] if the file cannot be read, and errors of `fits`.
 pub fn frames_of_recording<E: From<RecordingError>>(
     recording: &mut Recording,
-    detector: u8,
     fits: impl Fn(usize) -> Result<(), E>,
 ) -> Result<(Vec<Integrated>, Tally), E> {
     let setup = recording.setup.clone();
     let mut frames = Vec::new();
     let tally = hear_recording(recording, |heard, _| {
-        if let Some(frame) = heard.frame_of(detector) {
+        if let Some(frame) = heard.frame() {
             fits(frames.len() + 1)?;
             let mut alone = Integrated::new(&setup);
             alone.add(frame);

@@ -35,7 +35,6 @@ fn recorded(folder: &Path) -> PathBuf {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: vec!["depth".into()],
-        detectors: 1,
     };
     let setup = MeasurementSetup::new(&Order::CakeCutting, 0.05).unwrap();
     let target = Target::New(path.clone());
@@ -74,6 +73,11 @@ fn read(path: &Path) -> (Vec<Vec<u8>>, Option<String>) {
     let mut recording = Recording::open(path).unwrap();
     let packets = recording.by_ref().map(|packet| packet.unwrap().bytes).collect();
     (packets, recording.end().cut_short.clone())
+}
+
+/// The times of the packets of a recording.
+fn times(path: &Path) -> Vec<u64> {
+    Recording::open(path).unwrap().map(|packet| packet.unwrap().time_ns).collect()
 }
 
 /// Number of the found packets that are packets of the recording, in their order.
@@ -153,6 +157,9 @@ fn many_damaged_places_cost_what_they_hit() {
     assert!(recovered.bytes_lost > 0 && recovered.frames_lost.unwrap() > 0, "{recovered}");
     let (again, told) = read(&whole);
     assert_eq!((again, told), (found, None));
+    let before = times(&path);
+    assert!(before.is_sorted() && before[0] < before[before.len() - 1]);
+    assert_eq!(times(&whole), before);
     let mut recording = Recording::open(&whole).unwrap();
     let counters = tally_recording(&mut recording).unwrap().account().counters();
     let account = recording.end().account.clone().unwrap();

@@ -11,7 +11,6 @@ use nirspi::source::{Source, SourceOptions};
 use nirspi_nets::Device;
 use nirspi_recon::reconstruct::Method;
 use nirspi_recon::{Order, Side};
-use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 fn made() -> Made {
@@ -50,6 +49,9 @@ fn an_exported_file_gives_the_image_of_the_recording_to_the_bit() {
             assert_eq!(read.measurements, whole.measurements, "{format:?}");
             assert_eq!(image_bits(&read), image_bits(&whole), "{format:?}");
         }
+        let (_folder, csv) = exported(Format::Csv, &options);
+        let text = std::fs::read_to_string(csv).unwrap();
+        assert!(text.starts_with("# mean of 12 frames, ADC counts, simulated\n"), "{text}");
         let (_folder, npz) = exported(Format::Npz, &options);
         let (_other, npy) = exported(Format::Npy, &options);
         let of_npz = Selection {
@@ -73,56 +75,6 @@ fn an_exported_file_gives_the_image_of_the_recording_to_the_bit() {
             }
         }
     }
-}
-
-/// The numbers of an array of a Zarr store in one chunk, and its description.
-fn array(store: &Path, name: &str) -> (Value, Vec<[u8; 8]>) {
-    let description = std::fs::read(store.join(name).join("zarr.json")).unwrap();
-    let chunk = if name == "frames" { "c/0/0" } else { "c/0" };
-    let bytes = std::fs::read(store.join(name).join(chunk)).unwrap();
-    let numbers = bytes.chunks_exact(8).map(|number| number.try_into().unwrap()).collect();
-    (serde_json::from_slice(&description).unwrap(), numbers)
-}
-
-#[test]
-fn a_zarr_store_has_the_numbers_of_the_recording_in_the_order_of_its_description() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("rec.zarr");
-    let options = ExportOptions::default();
-    // The second time replaces the first.
-    for _ in 0..2 {
-        let exported = export(&recording(), &out, Format::Zarr, &options, &made()).unwrap();
-        assert_eq!((exported.frames, exported.patterns), (12, 256));
-        assert!(exported.bytes > 12 * 256 * 8, "{}", exported.bytes);
-    }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-    let whole = Source::read(&recording(), &SourceOptions::default()).unwrap();
-    let frames = Source::read_all(&recording(), &SourceOptions::default()).unwrap();
-
-    let (description, numbers) = array(&out, "frames");
-    assert_eq!(description["shape"], json!([12, 256]));
-    assert_eq!(description["chunk_grid"]["configuration"]["chunk_shape"], json!([12, 256]));
-    assert_eq!(description["data_type"], "float64");
-    let all = frames.iter().flat_map(|frame| frame.measurements.values());
-    assert!(numbers.into_iter().map(f64::from_le_bytes).eq(all.copied()));
-    let (_, mean) = array(&out, "d");
-    let mean: Vec<f64> = mean.into_iter().map(f64::from_le_bytes).collect();
-    assert_eq!(mean, whole.measurements.values());
-    let (rows, shown) = array(&out, "h_row");
-    assert_eq!(
-        (&rows["data_type"], &rows["dimension_names"]),
-        (&json!("int64"), &json!(["pattern"]))
-    );
-    let expected = whole.measurements.rows().iter().map(|&row| i64::from(row));
-    assert!(shown.into_iter().map(i64::from_le_bytes).eq(expected));
-
-    let group = std::fs::read(out.join("zarr.json")).unwrap();
-    let group: Value = serde_json::from_slice(&group).unwrap();
-    assert_eq!(
-        (&group["attributes"]["n"], &group["attributes"]["simulated"]),
-        (&json!(32), &json!(true))
-    );
-    assert_eq!(group["consolidated_metadata"]["metadata"]["frames"], description);
 }
 
 /// The pixels of the images of a topic of an MCAP file.

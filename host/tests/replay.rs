@@ -53,7 +53,6 @@ fn recorded(folder: &Path, is_whole: bool) -> PathBuf {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: vec!["depth".into(), "boot loader".into()],
-        detectors: 1,
     };
     let mut setup = MeasurementSetup::new(&Order::CakeCutting, 0.25).unwrap();
     setup.adc_latency = 6;

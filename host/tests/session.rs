@@ -31,7 +31,6 @@ const IDENTITY: Identity<'static> = Identity {
     adc_bits: 14,
     wavelength_nm: 1550,
     capabilities: Tail(Some(Capabilities::DEPTH)),
-    detectors: Tail(None),
 };
 
 /// Answers that arrive one at a time, whatever is asked.

@@ -86,10 +86,9 @@ impl Machine {
         if protocol >= Width::NARROW_SINCE {
             added = added.with(Capabilities::NARROW_SAMPLES);
         }
-        let detectors = bus.detectors();
         let spoken = version::speaks(protocol);
         let answered = if spoken { protocol } else { version::CURRENT };
-        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware, added, detectors });
+        self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware, added });
         self.session = if spoken { Session::Open { protocol } } else { Session::Foreign };
         if spoken && self.crash.is_some() {
             self.notices.push(Notice::Crash);
@@ -129,13 +128,11 @@ impl Machine {
         }
         self.loading = None;
         self.setup = None;
-        if bus.detectors() == 1 {
-            let version = fpga::read(bus, Register::Version).map_err(|_| Refusal::Bus)?;
-            let knows = self.protocol().is_some_and(|protocol| protocol >= Width::NARROW_SINCE);
-            setup.mode |= setup.packets(version, knows && configuration.narrow == Tail(Some(true)));
-            if bus.ring().is_some() {
-                setup.mode |= setup.port(version);
-            }
+        let version = fpga::read(bus, Register::Version).map_err(|_| Refusal::Bus)?;
+        let knows = self.protocol().is_some_and(|protocol| protocol >= Width::NARROW_SINCE);
+        setup.mode |= setup.packets(version, knows && configuration.narrow == Tail(Some(true)));
+        if bus.ring().is_some() {
+            setup.mode |= setup.port(version);
         }
         let table = match &configuration.order {
             PatternOrder::Table(table) => fpga::set_table(bus, table),

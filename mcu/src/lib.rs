@@ -3,7 +3,7 @@
 //! Each module has one idea. `camera` is what a board calls; `commands` (of the host) and `poll`
 //! (safety rules, then one step) drive the `machine`, which holds the state. The parts of the
 //! machine do not use the machine: `run` and `burst` (data), `selftest`, `gateware`, `configure`
-//! (checks), `safety` (sensors), `ring` (what the FPGA's parallel port has sent), `meter` (signal and noise), `fpga` (registers), `channels` (frames of further detectors), `notices` (replies and events that wait for
+//! (checks), `safety` (sensors), `ring` (what the FPGA's parallel port has sent), `meter` (signal and noise), `fpga` (registers), `notices` (replies and events that wait for
 //! the link), `packets` (a message into the link). `host_port` says which bytes a board transfers,
 //! `patience` how long a transfer to the host may wait, `lamps` what the board shows to somebody beside it.
 #![no_std]
@@ -25,7 +25,6 @@ extern crate std;
 
 mod burst;
 mod camera;
-mod channels;
 mod commands;
 mod configure;
 mod crash;

@@ -18,7 +18,7 @@ use crate::run::{self, Counters, Fpga, Run, SAMPLE_BYTES};
 use crate::selftest::{self, TestFrame};
 use crate::{BoardInfo, Crash, FpgaBus, Inputs, Limits, Micros, PacketSink, fpga, safety};
 use nirspi_wire::{
-    Answer, Channel, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State, version,
+    Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State, version,
 };
 
 /// State of the session with the host.
@@ -216,15 +216,13 @@ impl Machine {
         sink: &mut impl PacketSink,
     ) -> bool {
         let may_send = self.may_stream();
-        let sends_channels = self.protocol().is_some_and(|protocol| protocol >= Channel::SINCE);
         let absent = self.fpga_is_absent();
         let Activity::Run(run) = &mut self.activity else { return false };
         let (counters, meter) = (&mut self.counters, &mut self.meter);
         let path = run::Path { counters, meter, scratch: &mut self.scratch, may_send };
         let may_come = !absent && !self.release_pending;
         let release_pending = &mut self.release_pending;
-        let worked =
-            run.take_frame(now, path, sends_channels, (may_come, release_pending), bus, sink);
+        let worked = run.take_frame(now, path, (may_come, release_pending), bus, sink);
         match run.progress(now, &self.counters) {
             run::Progress::Complete => self.end_run(now, None, bus),
             run::Progress::Stalled => {

@@ -20,7 +20,7 @@ use crate::{BusError, FpgaBus, Micros, float, fpga};
 use nirspi_wire::fpga::{FpgaFrame, Header};
 use nirspi_wire::ready::Reader;
 use nirspi_wire::register::{Register, mode};
-use nirspi_wire::{ADC_BITS, FrameFlags, Samples, Signal};
+use nirspi_wire::{ADC_BITS, FrameFlags, Signal};
 
 /// Time between two comparisons.
 const PERIOD: Micros = Micros(250_000);
@@ -176,20 +176,6 @@ impl Meter {
     pub fn forget(&mut self) {
         if let Pair::Begun { at, .. } = self.pair {
             self.pair = Pair::Due(at);
-        }
-    }
-
-    /// Packs the samples of a pair's first frame again, after the memory of packed samples has been used for something
-    /// else. `frame` reads that frame from the FPGA once more.
-    pub fn restore<'f>(&mut self, frame: impl FnOnce() -> Option<&'f [u8]>, packed: &mut [u8]) {
-        if !matches!(self.pair, Pair::Begun { .. }) {
-            return;
-        }
-        let frame = frame().and_then(|bytes| FpgaFrame::parse(bytes).ok());
-        let again =
-            frame.map(|frame| Samples::pack(frame.sums().map(|sums| sums.difference()), packed));
-        if !matches!(again, Some(Ok(_))) {
-            self.forget();
         }
     }
 

@@ -10,8 +10,8 @@ use crate::{BoardInfo, Crash, PacketSink};
 use heapless::Deque;
 use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{
-    ADC_BITS, ADC_HZ, Answer, Capabilities, Channel, CrashReport, DeviceMessage, Event, Identity,
-    Refusal, Reply, SIDE, Tail, Version, WAVELENGTH_NM,
+    ADC_BITS, ADC_HZ, Answer, Capabilities, CrashReport, DeviceMessage, Event, Identity, Refusal,
+    Reply, SIDE, Tail, Version, WAVELENGTH_NM,
 };
 
 /// The outcome of a command, without borrowed data.
@@ -25,7 +25,6 @@ pub(crate) enum Outcome {
         gateware: Version,
         /// What the FPGA adds to the board's capabilities.
         added: Capabilities,
-        detectors: u8,
     },
     Other(Result<Answer<'static>, Refusal>),
 }
@@ -126,7 +125,7 @@ fn message<'m>(
         Notice::Reply { id, outcome: Outcome::Other(outcome) } => {
             DeviceMessage::Reply(Reply { id, outcome })
         }
-        Notice::Reply { id, outcome: Outcome::Hello { protocol, gateware, added, detectors } } => {
+        Notice::Reply { id, outcome: Outcome::Hello { protocol, gateware, added } } => {
             let identity = Identity {
                 protocol,
                 firmware: info.firmware,
@@ -140,7 +139,6 @@ fn message<'m>(
                 capabilities: Tail(
                     (protocol >= Capabilities::SINCE).then_some(info.capabilities.with(added)),
                 ),
-                detectors: Tail((protocol >= Channel::SINCE).then_some(detectors)),
             };
             DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
         }

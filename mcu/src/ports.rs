@@ -58,21 +58,6 @@ pub trait FpgaBus {
     /// [`BusError`]; the firmware then discards and releases the frame.
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError>;
 
-    /// Number of detectors whose frames this bus has, at least 1. A bus with several keeps no frame, and the firmware
-    /// makes the packets, because a packet of the FPGA holds the frame of detector 0.
-    fn detectors(&self) -> u8 {
-        1
-    }
-
-    /// The frame of a further detector, 1 or above, of the same patterns as [`frame`](Self::frame), until
-    /// `CONTROL.RELEASE` is written. `None`: there is no such frame.
-    ///
-    /// # Errors
-    /// [`BusError`]; the firmware then sends no frame of this detector.
-    fn channel(&mut self, _detector: u8) -> Result<Option<&[u8]>, BusError> {
-        Ok(None)
-    }
-
     /// Bytes to read of a packet of so many patterns, with samples of this width.
     fn packet_bytes(&self, patterns: u16, width: Width) -> usize {
         nirspi_wire::ready::read_bytes(patterns, width)

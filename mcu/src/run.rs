@@ -7,7 +7,6 @@
 
 mod stream;
 
-use crate::channels::Channels;
 use crate::configure::Setup;
 use crate::meter::Meter;
 use crate::notices::Outcome;
@@ -386,15 +385,12 @@ impl Run {
     /// at once, and packed while the next one comes, or when no next one comes in time. Any other
     /// frame is sent or counted before this call returns.
     ///
-    /// With `sends_channels`, the frames of further detectors go out right after that of detector 0.
-    ///
     /// `may_come` is false if the FPGA does not answer, and after a failed release, when the line
     /// still signals the frame that was taken before. `release_pending` is set if a release fails.
     pub fn take_frame(
         &mut self,
         now: Micros,
         mut path: Path<'_>,
-        sends_channels: bool,
         (may_come, release_pending): (bool, &mut bool),
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
@@ -438,20 +434,6 @@ impl Run {
         let bytes = if has_come { bus.frame().ok().flatten() } else { None };
         let taken =
             bytes.and_then(|bytes| assemble(bytes, self.patterns, (path.meter, now), path.scratch));
-        if bus.detectors() > 1
-            && let Some((header, samples)) = taken
-        {
-            // The release takes the frames of all detectors, so they are sent before it.
-            let sent = self.deliver(now, path.counters, path.may_send, (header, samples), sink);
-            if sent && sends_channels {
-                let device_time_us = self.anchor.time_of(header.clock).0;
-                let set = Channels { run: path.counters.run, device_time_us, of: header };
-                set.send(path.scratch, bus, sink);
-                path.meter.restore(|| bus.frame().ok().flatten(), path.scratch);
-            }
-            *release_pending = fpga::release(bus).is_err();
-            return true;
-        }
         // The FPGA needs its buffer back before the next frame is complete, so the release comes
         // before the link.
         *release_pending = fpga::release(bus).is_err();
@@ -504,7 +486,7 @@ impl Run {
         }
     }
 
-    /// Sends or counts a frame that was assembled; true if the frame was sent.
+    /// Sends or counts a frame that was assembled.
     #[inline(never)]
     fn deliver(
         &mut self,
@@ -513,10 +495,10 @@ impl Run {
         may_send: bool,
         (header, samples): (Header, Samples<'_>),
         sink: &mut impl PacketSink,
-    ) -> bool {
+    ) {
         if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
             // The bus lost the release of this frame. A frame that comes again is no progress.
-            return false;
+            return;
         }
         self.last_frame = now;
         counters.advance(header.sequence.wrapping_add(1), header.lost);
@@ -533,7 +515,6 @@ impl Run {
         let count = if sent { &mut counters.sent } else { &mut counters.dropped };
         *count = count.wrapping_add(1);
         counters.reconcile();
-        sent
     }
 
     /// Reply and event of a run whose LEDs are off and whose last frame is through; `None` before.

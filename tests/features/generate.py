@@ -7,7 +7,7 @@ choose the same. Out of date, the list costs such builds time and nothing else; 
     python3 tests/features/generate.py
 
 cargo-hakari makes such lists too, for all features of a workspace at once: a plain `cargo test` would then compile what
-belongs to the features `zenoh` and `flash`.
+belongs to the feature `flash`.
 """
 
 import collections

@@ -65,16 +65,16 @@ processor and 20 to 23 MB of memory from the first session to the last:
 python3 host/scripts/serve_soak.py target/release/nirspi --plot memory.svg --markdown    # ten minutes; Linux, Python alone
 ```
 
-The command starts `nirspi serve` with a token and a server for viewers, and lets it open 256 files
-(`ulimit -n 256`). 1000 clients, from 40 addresses of the same machine, each do one of the things in
-the table, and again. All the while one page reads its events and asks for the state each second;
-every ten seconds a page is opened anew. The command exits with 1 if the page's stream ends, if a
-page waits for more than 5 s, if a client without the right to do so gets any answer but a refusal,
-or if memory or open files grow. It prints the tables below, and without `--markdown` all that it
-saw as JSON.
+The command starts `nirspi serve` with a token, and lets it open 256 files (`ulimit -n 256`). 1000
+clients, from 40 addresses of the same machine, each do one of the things in the table, and again.
+All the while one page reads its events and asks for the state each second; every ten seconds a page
+is opened anew. The command exits with 1 if the page's stream ends, if a page waits for more than 5
+s, if a client without the right to do so gets any answer but a refusal, or if memory or open files
+grow. It prints the tables below, and without `--markdown` all that it saw as JSON.
 
 Seen on 22 November 2026 (simulated camera, release build, two cores that clients and builds used
-too, load 10), in 599 s: 620 668 connections, 1034 a second. A new connection takes the place of the
+too, load 10), in 599 s: 620 668 connections, 1034 a second, a fifth of them to a WebSocket server
+that has gone since. A new connection takes the place of the
 [oldest one without an event stream](live-page.md#who-can-open-the-page), so most connections were
 closed before their answer.
 
@@ -92,9 +92,6 @@ closed before their answer.
 | connects and leaves | 41 418 | 0 | 0 | 41 418 |
 | has a wrong token | 41 341 | 27 931 with 401 | 13 410 | 0 |
 | is a page of another site | 41 437 | 28 243 with 403 | 13 194 | 0 |
-| WebSocket, has a wrong token | 41 465 | 29 456 with 401 | 12 009 | 0 |
-| WebSocket, sends noise | 41 229 | 25 723 with 503 | 15 506 | 0 |
-| WebSocket, reads nothing | 41 274 | 0 | 37 968 | 3 306 |
 
 | what a good page and the program saw | before | among the clients |
 | -- | -- | -- |

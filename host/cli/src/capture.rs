@@ -54,11 +54,6 @@ pub struct Args {
     /// `nirspi reconstruct --enhance` does
     #[arg(long, value_name = "DIR")]
     picture: Option<PathBuf>,
-    /// Publish the frames over Zenoh while they are recorded, for --camera zenoh:KEY of other programs: KEY or
-    /// KEY@tcp/HOST:PORT
-    #[cfg(feature = "zenoh")]
-    #[arg(long, value_name = "KEY")]
-    publish: Option<nirspi::relay::zenoh::ZenohAddress>,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -99,16 +94,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     };
     let mut preview = Preview::new(watch);
-    #[cfg(feature = "zenoh")]
-    let captured = match &args.publish {
-        Some(address) => {
-            let (to, identity) = (address.publish()?, session.identity().clone());
-            let mut published = nirspi::relay::Publishing::new(&identity, to, &mut preview);
-            observe(&mut session, &options, &mut published)
-        }
-        None => observe(&mut session, &options, &mut preview),
-    };
-    #[cfg(not(feature = "zenoh"))]
     let captured = observe(&mut session, &options, &mut preview);
     drop(bar);
     let captured = captured?;
@@ -164,7 +149,6 @@ fn say(args: &Args, report: &CaptureReport<'_>) -> Result<ExitCode> {
             Some(made) => print::line(format_args!("{frames}: {} made", count(made, "frame")))?,
             None => print::line(frames)?,
         }
-        report.further_words().iter().try_for_each(print::line)?;
         print::line(format_args!(
             "{:.0} frames/s over {:.2} s, {:.1} MB in {path}",
             report.frames_per_s,

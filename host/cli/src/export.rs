@@ -1,4 +1,4 @@
-//! `nirspi export`, `recover`, `sync`: a recording in another form, or repaired; several in one time.
+//! `nirspi export`, `recover`: a recording in another form, or repaired.
 
 use super::camera::ModelArgs;
 use super::print;
@@ -7,7 +7,6 @@ use super::report::{ReportArgs, words};
 use anyhow::Result;
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::recording::{Target, recover as recovered};
-use nirspi::sync::recordings;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -26,21 +25,9 @@ pub struct Args {
     /// Do not correct the readings for the leak from pattern to pattern
     #[arg(long)]
     keep_leak: bool,
-    /// Detector of a camera that has several [default: every detector for npz, detector 0 otherwise]
-    #[arg(long, value_name = "N")]
-    detector: Option<u8>,
     /// mcap: also enhanced images, and the spread of each pixel if the scene were measured again (9 runs of the network each)
     #[arg(long)]
     enhance: bool,
-    /// parquet: what the camera looked at
-    #[arg(long, value_name = "TEXT")]
-    scene: Option<String>,
-    /// parquet: distance to the target in metres
-    #[arg(long, value_name = "M")]
-    distance_m: Option<f64>,
-    /// parquet: an image of the scene as it is, (n, n)
-    #[arg(long, value_name = "FILE.npy")]
-    truth: Option<PathBuf>,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -51,10 +38,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let out = args.out.clone().unwrap_or_else(|| args.to.beside(&args.recording));
     let options = ExportOptions {
         keep_leak: args.keep_leak,
-        detector: args.detector,
-        scene: args.scene.clone(),
-        distance_m: args.distance_m,
-        truth: args.truth.clone(),
         model: Some(args.model.read()?),
         enhance: args.enhance,
     };
@@ -81,25 +64,4 @@ pub struct RecoverArgs {
 pub fn recover(args: &RecoverArgs) -> Result<ExitCode> {
     let recovered = recovered(&args.recording, &Target::New(args.out.clone()))?;
     args.report.print_answer(&recovered, |recovered| print::line(recovered))
-}
-
-/// Fit the clocks of cameras that were recorded side by side, and give all frames one time: the computer's
-///
-/// Run one `nirspi capture` for each camera at the same time on one computer, then this command on the recordings.
-#[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  nirspi sync left.mcap right.mcap --out frames.csv")]
-pub struct SyncArgs {
-    /// Recordings (.mcap), one of each camera; the others are compared with the first
-    #[arg(required = true, value_name = "REC")]
-    recordings: Vec<PathBuf>,
-    /// Table of the frames of all recordings in the order of their times
-    #[arg(long, value_name = "FILE.csv")]
-    out: Option<PathBuf>,
-    #[command(flatten)]
-    report: ReportArgs,
-}
-
-pub fn sync(args: &SyncArgs) -> Result<ExitCode> {
-    let synced = recordings(&args.recordings, args.out.as_deref())?;
-    args.report.print_answer(&synced, |s| print::notes(&s.notes).and_then(|()| print::line(s)))
 }

@@ -11,7 +11,6 @@ mod calibration;
 mod camera;
 mod camera_model;
 mod capture;
-mod dataset;
 mod deblur;
 mod demo;
 mod devices;
@@ -86,10 +85,8 @@ commands! {
     Example(example::Args) => example::run,
     Reconstruct(reconstruct::Args) => reconstruct::run,
     Capture(capture::Args) => capture::run,
-    Dataset(dataset::Args) => dataset::run,
     Export(export::Args) => export::run,
     Recover(export::RecoverArgs) => export::recover,
-    Sync(export::SyncArgs) => export::sync,
     Serve(serve::Args) => serve::run,
     Virtual(serve_virtual::Args) => serve_virtual::run,
     Devices(devices::Args) => devices::run,

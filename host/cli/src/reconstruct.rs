@@ -1,10 +1,8 @@
 //! `nirspi reconstruct`: an image from measurements of nirspi or of another lab.
 
-mod archive;
+mod many;
 mod matrix;
 mod stack;
-
-pub use archive::FolderArgs;
 
 use super::camera::parse_order;
 use super::method::MethodArgs;
@@ -22,13 +20,12 @@ use nirspi_recon::Sampling;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Make an image from a measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or a recording (.mcap), or a table from a
-/// folder of such files
+/// Make an image from a measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or a recording (.mcap), or a stack of images
+/// from many
 ///
 /// The command writes image.npy (float32, n x n), image.png and report.json. For complex readings it also writes real.npy
-/// and imaginary.npy. From a folder, it writes one Parquet table with the image of each measurement in a row: files that
-/// give no image are listed, have no row, and make the exit code 1. The folder and the table may be addresses of an object
-/// store, such as s3://bucket/archive, in a program built with --features object-store.
+/// and imaginary.npy. From several files, or from a folder, it makes one stack: image.npy has the images of all measurements,
+/// (F, n, n), and report.json the file of each. Files that give no image are named, and make the exit code 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi reconstruct wing.npz --out out/\n\
@@ -36,7 +33,7 @@ use std::process::ExitCode;
     \x20 nirspi reconstruct spyrit.npy --shown walsh-2d --out out/\n\
     \x20 nirspi reconstruct dmd.npz --matrix patterns.npy --method tv --out out/\n\
     \x20 nirspi reconstruct rec.mcap --index all --warm-start --sampling 0.3 --out video/\n\
-    \x20 nirspi reconstruct archive/ --jobs 8 --resume --shard 2/4 --out table-2.parquet")]
+    \x20 nirspi reconstruct monday/ friday.npz --sampling 30% --out week/")]
 pub struct Args {
     /// Share of all n x n patterns to use: 0.3, 30% or 30
     #[arg(long, value_name = "SHARE", default_value_t = Sampling::ALL)]
@@ -66,9 +63,10 @@ pub struct Args {
     enhance: bool,
     #[command(flatten)]
     source: SourceArgs,
-    #[command(flatten)]
-    folder: FolderArgs,
-    /// Folder for the results; for a folder of measurements, the table (.parquet)
+    /// More files, or folders of files
+    #[arg(value_name = "MORE", help_heading = "Input")]
+    more: Vec<PathBuf>,
+    /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     #[command(flatten)]
@@ -82,14 +80,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(order) => FirstPatterns::Of(parse_order("--order", order)?),
     };
     args.method.check()?;
-    if nirspi::archive::is_folder(&args.source.input) {
-        return archive::run(args, first);
+    if args.source.input.is_dir() || !args.more.is_empty() {
+        return many::run(args, first);
     }
-    args.folder.refuse()?;
     if let Some(path) = &args.matrix {
         return matrix::run(args, path);
     }
-    if [args.source.index, args.source.detector].contains(&Some(Index::All)) {
+    if args.source.index == Some(Index::All) {
         return stack::run(args, &first);
     }
     if args.warm_start {

@@ -39,10 +39,6 @@ pub struct Args {
     /// Address of the page; port 0 takes a free port. An address that other machines reach demands a token
     #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
     listen: String,
-    /// Also show the camera to Foxglove and Lichtblick, at a port beside the page or at an address [default: no; port 8765
-    /// if neither is given]
-    #[arg(long, value_name = "PORT|ADDR", num_args = 0..=1, default_missing_value = "8765")]
-    foxglove: Option<String>,
     /// Token that browsers and scripts must know, 16 characters or more [default: none for an address that only this machine
     /// reaches, else a random one, in the printed address]
     #[arg(long, value_name = "TOKEN")]
@@ -97,12 +93,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(folder) = args.record_to.as_ref().filter(|folder| !folder.is_dir()) {
         bail!("--record-to {}: found no such folder", folder.display());
     }
-    let mut server = Server::bind(&args.listen, args.token.clone(), made())
+    let server = Server::bind(&args.listen, args.token.clone(), made())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
-    if let Some(place) = &args.foxglove {
-        let problem = || format!("--foxglove {place}: cannot listen there");
-        server = server.with_foxglove(place).with_context(problem)?;
-    }
     let imaging =
         Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(args)?)?;
     let settings = Settings {

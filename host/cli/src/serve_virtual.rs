@@ -38,9 +38,6 @@ pub struct Args {
     /// Let the camera's time run no faster than the clock on the wall: the patterns' clock and --sweeps set the frames a second
     #[arg(long)]
     real_time: bool,
-    /// Millionths by which the camera's simulated clock gains on the clock on the wall
-    #[arg(long, value_name = "PPM", default_value_t = 0, requires = "real_time", value_parser = clap::value_parser!(i32).range(-10_000..=10_000))]
-    clock_ppm: i32,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -65,7 +62,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         once: args.once,
         drop_when_full: args.drop_when_full,
         real_time: args.real_time,
-        clock_error_ppm: args.clock_ppm.into(),
     };
     let (fpga, depth) = (optics.fpga(seed)?, optics.depth(seed)?);
     let serial = optics.serial(seed);

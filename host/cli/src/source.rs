@@ -21,9 +21,6 @@ pub struct SourceArgs {
     /// each frame of a recording is one frame of a video; without this option, the frames of a recording are summed
     #[arg(long, value_name = "N|all")]
     pub index: Option<Index>,
-    /// Which detector of a recorded camera that has several: a number from 0, or all for one image of each [default: 0]
-    #[arg(long, value_name = "N|all")]
-    pub detector: Option<Index>,
     #[arg(long, value_name = "ORDER", help = shown_help())]
     pub shown: Option<String>,
     /// Side of the image in pixels, for a file that does not say its side and holds part of a sweep
@@ -89,9 +86,9 @@ impl SourceArgs {
 
     /// How to read measurements.
     pub fn options(&self) -> Result<SourceOptions> {
-        let Self { index, detector, part, keep_leak, no_flat_field, .. } = *self;
+        let Self { index, part, keep_leak, no_flat_field, .. } = *self;
         let file = self.selection()?;
-        Ok(SourceOptions { index, detector, file, part, keep_leak, no_flat_field })
+        Ok(SourceOptions { index, file, part, keep_leak, no_flat_field })
     }
 
     /// Reads one measurement.

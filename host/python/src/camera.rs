@@ -15,12 +15,13 @@ use crate::work::long;
 use nirspi::calibration::{CalibrationPolicy, Settling};
 use nirspi::capture::{Calibration, CaptureError, CaptureOptions};
 use nirspi::causes::in_one_line;
+use nirspi::frame_time::HostClock;
 use nirspi::link::{CameraAddress, Link};
 use nirspi::recording::Target;
 use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
-use nirspi::sync::HostClock;
 use nirspi::virtual_camera::{MemoryLink, calibrate_against_white, flat_field_against_white};
+use numpy::PyArray1;
 use options::Options;
 use pyo3::exceptions::{PyConnectionError, PyOSError};
 use pyo3::prelude::*;
@@ -64,6 +65,8 @@ pub struct Camera {
     calibrated: Calibrated,
     flat: Option<nirspi::calibration::FlatField>,
     is_virtual: bool,
+    /// What a perfect camera would see of a virtual camera's scene.
+    truth: Option<Vec<f32>>,
     identity: String,
     reports: Vec<String>,
     /// What the last run has counted.
@@ -114,7 +117,14 @@ impl Camera {
         let is_virtual = place == CameraAddress::Virtual;
         let optics = is_virtual.then(|| options.optics(&model)).transpose()?;
         let seed = options.seed;
-        let (session, calibrated, flat) = long(py, move |_| {
+        let (session, calibrated, flat, truth) = long(py, move |_| {
+            let truth = match &optics {
+                Some(optics) => {
+                    let seen = optics.focused_footprint().map_err(refusal)?;
+                    Some(seen.weights().to_vec())
+                }
+                None => None,
+            };
             let mut flat = None;
             let calibrated = match (&optics, policy) {
                 (Some(optics), CalibrationPolicy::Kept) => {
@@ -130,7 +140,7 @@ impl Camera {
             };
             let mut session = place.open(link).map_err(of_opening)?;
             session.await_reports().map_err(of_session)?;
-            Ok((session, calibrated, flat))
+            Ok((session, calibrated, flat, truth))
         })?;
         let identity = serde_json::to_string(session.identity());
         Ok(Self {
@@ -141,6 +151,7 @@ impl Camera {
             calibrated,
             flat,
             is_virtual,
+            truth,
             last: Mutex::new(None),
             process: std::process::id(),
         })
@@ -177,6 +188,12 @@ impl Camera {
     #[getter]
     fn is_virtual(&self) -> bool {
         self.is_virtual
+    }
+
+    /// What a perfect camera of these LEDs would see of the scene, 0 to 1.
+    #[getter]
+    fn truth<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f32>>> {
+        self.truth.as_ref().map(|truth| PyArray1::from_slice(py, truth))
     }
 
     #[getter]

@@ -5,7 +5,6 @@
 //! No call ends the interpreter: bad input is `nirspi.Error` or `OSError` with the library's text, and a panic is a
 //! `RuntimeError` (`tests/test_bad_input.py`). Long work runs without the GIL and ends at Ctrl-C ([`work`]).
 
-mod archive;
 mod arrays;
 mod camera;
 mod errors;
@@ -28,8 +27,6 @@ use pyo3::prelude::*;
 /// The compiled part of `nirspi`.
 #[pymodule]
 mod _nirspi {
-    #[pymodule_export]
-    use crate::archive::Table;
     #[pymodule_export]
     use crate::camera::{Camera, Run};
     #[pymodule_export]
@@ -55,7 +52,7 @@ mod _nirspi {
     #[pymodule_export]
     use crate::reconstruct::{bases, methods, reconstruct, reconstruct_file, reconstruct_matrix};
     #[pymodule_export]
-    use crate::recording::{export_zarr, read_recording};
+    use crate::recording::read_recording;
     #[pymodule_export]
     use crate::work::{devices, panic_for_tests};
 }

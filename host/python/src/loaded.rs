@@ -40,11 +40,11 @@ pub struct Loaded {
     noise: Option<f64>,
 }
 
-/// The measurements of a file or recording: one, or all with `index` or `detector` "all".
+/// The measurements of a file or recording: one, or all with `index` "all".
 #[pyfunction]
 pub fn load(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyResult<Loaded> {
     let options = options.extract::<Options>()?.checked()?;
-    if ![options.index, options.detector].contains(&Some(Index::All)) {
+    if options.index != Some(Index::All) {
         let source = long(py, |_| Source::read(&path, &options).map_err(of_source))?;
         return Loaded::of(py, vec![source], false);
     }

@@ -55,7 +55,6 @@ impl FlatField {
 #[pyo3(from_item_all)]
 pub(crate) struct Options {
     index: Option<String>,
-    detector: Option<String>,
     shown: Option<String>,
     side: Option<u64>,
     field: Option<String>,
@@ -91,11 +90,6 @@ impl Options {
         };
         Ok(SourceOptions {
             index: self.index.as_deref().map(|index| word::<Index>("index", index)).transpose()?,
-            detector: self
-                .detector
-                .as_deref()
-                .map(|at| word::<Index>("detector", at))
-                .transpose()?,
             file,
             part: word::<Part>("part", &self.part)?,
             keep_leak: self.keep_leak,

@@ -361,7 +361,7 @@ pub fn reconstruct_file<'py>(
 > {
     let source = source.extract::<measurement::Options>()?.checked()?;
     let options: Options<'_> = options.extract()?;
-    if options.warm_start || source.index != Some(Index::All) || source.detector.is_some() {
+    if options.warm_start || source.index != Some(Index::All) {
         return Ok(None);
     }
     let (method, settings) = (options.method()?, options.settings()?);

@@ -1,11 +1,9 @@
 //! Recordings: every frame with its times, and what else the file says.
 
 use crate::arrays::array;
-use crate::errors::{of_file, of_recording, of_source, refusal, refused};
-use crate::made::made;
+use crate::errors::{of_recording, refused};
 use crate::work::long;
 use nirspi::events;
-use nirspi::export::{ExportError, ExportOptions, Format, export};
 use nirspi::recording::Recording;
 use nirspi::tally::Tally;
 use nirspi_wire::{DeviceMessage, open};
@@ -43,8 +41,7 @@ pub fn read_recording<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let (recording, found, happened, tally) = long(py, |stop| {
         let mut recording = Recording::open(&path).map_err(of_recording)?;
-        let mut tally = Tally::new(&recording.setup, recording.run)
-            .with_detectors(recording.identity.detectors);
+        let mut tally = Tally::new(&recording.setup, recording.run);
         let (mut found, mut happened) = (Frames::default(), Vec::new());
         for packet in &mut recording {
             if stop.load(Ordering::Relaxed) {
@@ -95,18 +92,4 @@ pub fn read_recording<'py>(
     dict.set_item("sweeps", array(py, found.sweeps))?;
     dict.set_item("flags", array(py, found.flags))?;
     Ok(dict)
-}
-
-/// Writes the frames of a recording as a Zarr store, whole or not at all.
-#[pyfunction]
-pub fn export_zarr(py: Python<'_>, path: PathBuf, out: PathBuf, keep_leak: bool) -> PyResult<()> {
-    let options = ExportOptions { keep_leak, ..ExportOptions::default() };
-    let made = made(py)?;
-    long(py, |_| match export(&path, &out, Format::Zarr, &options, &made) {
-        Ok(_) => Ok(()),
-        Err(ExportError::File(error)) => Err(of_file(error)),
-        Err(ExportError::Recording(error)) => Err(of_recording(error)),
-        Err(ExportError::Source(error)) => Err(of_source(error)),
-        Err(error) => Err(refusal(error)),
-    })
 }

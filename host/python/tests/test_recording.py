@@ -1,7 +1,6 @@
 """Recordings: frames with their times, whole or cut short, as tables."""
 
 import json
-import subprocess
 
 import numpy as np
 import pytest
@@ -29,23 +28,6 @@ def test_a_recording_holds_what_the_camera_gave(path):
     assert recording.identity["board"] == "virtual" and recording.settling["adc_latency"] == 6
     assert any("run 1 has ended: 30 frames" in text for _time, text in recording.events)
     assert recording.cut_short is None
-
-
-def test_every_detector_of_a_camera_is_in_its_recording(tmp_path):
-    three = ns.CameraModel(toml="[detector]\nfurther_mm = [[150, 0], [0, -150]]")
-    path = tmp_path / "three.mcap"
-    with ns.Camera("virtual", model=three, sampling=0.25) as camera:
-        assert camera.detectors == 3
-        camera.record(path, frames=5)
-    recording = ns.Recording(path)
-    assert recording.detectors == 3 and recording.y.shape == (5, 256)
-    assert recording.measurement().d.shape == (256,)
-    each = recording.measurement(detector="all").d
-    assert each.shape == (3, 256)
-    assert (recording.measurement().d == each[0]).all()
-    assert (recording.measurement(detector=2).d == each[2]).all() and (each[1] != each[2]).any()
-    with pytest.raises(ns.Error, match="detector 3, expected 0 to 2"):
-        recording.measurement(detector=3)
 
 
 def test_the_frames_are_read_when_they_are_asked_for(path):
@@ -95,32 +77,6 @@ def test_a_parquet_table(path, tmp_path):
     table = pq.read_table(tmp_path / "r.parquet")
     assert (np.stack(table["y"].to_numpy()) == recording.y).all()
     assert json.loads(table.schema.metadata[b"rows"]) == recording.rows.tolist()
-
-
-def test_a_zarr_store_has_the_programs_bytes(cli, path, tmp_path):
-    recording = ns.Recording(path)
-    recording.to_zarr(tmp_path / "ours")
-    subprocess.run([cli, "export", path, "--to", "zarr", "--out", tmp_path / "cli"], check=True)
-    files = sorted(p.relative_to(tmp_path / "cli") for p in (tmp_path / "cli").rglob("*") if p.is_file())
-    assert len(files) > 6
-    for name in files:
-        ours, cli_s = ((tmp_path / who / name).read_bytes() for who in ("ours", "cli"))
-        if name.name == "zarr.json" and b"provenance" in ours:
-            # The provenance says which program and which command.
-            ours, cli_s = (json.loads(text) for text in (ours, cli_s))
-            for read in (ours, cli_s):
-                del read["attributes"]["provenance"]
-        assert ours == cli_s, name
-    zarr = pytest.importorskip("zarr")
-    store = zarr.open_group(tmp_path / "ours", mode="r")
-    assert np.allclose(store["frames"][:], recording.measurement(index="all").d, rtol=1e-12)
-    assert store["h_row"][:].tolist() == recording.rows.tolist()
-    recording.to_zarr(tmp_path / "leak", keep_leak=True)
-    kept = zarr.open_group(tmp_path / "leak", mode="r")["frames"][:]
-    assert np.allclose(kept, recording.measurement(index="all", keep_leak=True).d, rtol=1e-12)
-    assert not np.allclose(kept, store["frames"][:])
-    with pytest.raises(OSError, match="no such file or folder"):
-        recording.to_zarr(tmp_path / "none" / "there" / "x")
 
 
 def test_what_is_no_recording_is_refused(tmp_path):

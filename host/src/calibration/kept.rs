@@ -143,7 +143,6 @@ mod tests {
             adc_bits: 14,
             wavelength_nm: 1550,
             capabilities: Vec::new(),
-            detectors: 1,
         }
     }
 

@@ -43,7 +43,7 @@ impl Junk {
     ) {
         let count = match content {
             _ if new_frame => &mut self.frames,
-            Err(_) | Ok(DeviceMessage::Frame(_) | DeviceMessage::Channel(_)) => &mut self.useless,
+            Err(_) | Ok(DeviceMessage::Frame(_)) => &mut self.useless,
             Ok(_) => &mut self.messages,
         };
         *count += bytes as u64;

@@ -12,14 +12,9 @@ impl Capture {
     /// stopped it and all frames made have arrived.
     #[must_use]
     pub fn missing(&self) -> Option<String> {
-        let of_each = self.further_counters().into_iter().enumerate();
-        let of_each = of_each.filter_map(|(at, counters)| {
-            frames(counters).map(|lacks| format!("detector {}: {lacks}", at + 1))
-        });
         let parts: Vec<String> = [self.end(), frames(self.counters)]
             .into_iter()
             .flatten()
-            .chain(of_each)
             .chain(self.packets())
             .collect();
         (!parts.is_empty()).then(|| parts.join("; "))
@@ -70,16 +65,9 @@ impl Capture {
         }
     }
 
-    /// The loss counters of each further detector, detector 1 first.
-    #[must_use]
-    pub fn further_counters(&self) -> Vec<LossCounters> {
-        self.further.iter().map(|detector| detector.account.counters()).collect()
-    }
-
     /// Damaged packets that were not frames of the run. Their content is unknown.
     fn packets(&self) -> Option<String> {
-        let further: u64 = self.further_counters().iter().map(|counters| counters.corrupt).sum();
-        let others = self.damaged_packets.saturating_sub(self.counters.corrupt + further);
+        let others = self.damaged_packets.saturating_sub(self.counters.corrupt);
         (others > 0).then(|| {
             let packets = if others == 1 { "packet" } else { "packets" };
             format!("{others} damaged {packets} beyond these frames, of unknown content")
@@ -114,7 +102,6 @@ mod tests {
             adc_bits: 14,
             wavelength_nm: 1550,
             capabilities: Vec::new(),
-            detectors: 1,
         }
     }
 
@@ -128,7 +115,6 @@ mod tests {
             settling: None,
             calibration_problem: None,
             counters: LossCounters { received: 50, ..Default::default() },
-            further: Vec::new(),
             damaged_packets: 0,
             unknown_packets: 0,
             repeated: 0,

@@ -19,11 +19,8 @@ pub struct CaptureReport<'r> {
     pub recording: &'r Path,
     /// Size of the file.
     pub bytes: u64,
-    /// The loss counters of detector 0.
+    /// The loss counters.
     pub frames: LossCounters,
-    /// The loss counters of each further detector, detector 1 first.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub further: Vec<LossCounters>,
     /// As counted by the camera; `null` if the camera disconnected before it reported.
     pub made: Option<u64>,
     /// Number of damaged packets of any kind.
@@ -79,7 +76,6 @@ impl<'r> CaptureReport<'r> {
             recording: path,
             bytes: std::fs::metadata(path)?.len(),
             frames: counters,
-            further: captured.further_counters(),
             made: captured.made,
             damaged_packets: captured.damaged_packets,
             unknown_packets: captured.unknown_packets,
@@ -97,12 +93,5 @@ impl<'r> CaptureReport<'r> {
             calibration_note: choice.note.as_deref(),
             calibration_problem: captured.calibration_problem.as_ref().map(|p| in_one_line(p)),
         })
-    }
-
-    /// The account of each further detector, one line each.
-    #[must_use]
-    pub fn further_words(&self) -> Vec<String> {
-        let of_each = self.further.iter().zip(1..);
-        of_each.map(|(counters, detector)| format!("detector {detector}: {counters}")).collect()
     }
 }

@@ -179,7 +179,7 @@ impl Run {
         };
         observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
         let now = Instant::now();
-        let tally = Tally::new(&setup, Some(number)).with_detectors(session.identity().detectors);
+        let tally = Tally::new(&setup, Some(number));
         let mut run = Self {
             setup,
             settling,
@@ -331,7 +331,6 @@ impl Run {
             calibration_problem: self.calibration_problem,
             integrated: self.tally.integrated().clone(),
             counters: account.counters(),
-            further: self.tally.further().to_vec(),
             damaged_packets: account.damaged_packets(),
             unknown_packets: self.tally.unknown_packets(),
             repeated: account.repeated(),
@@ -407,8 +406,7 @@ fn finish(
     captured: &Capture,
 ) -> Result<PathBuf, CaptureError> {
     let Capture { counters, asked, made, .. } = *captured;
-    let further = captured.further_counters();
-    let account = RunAccount { counters, further, asked, made, missing: captured.missing() };
+    let account = RunAccount { counters, asked, made, missing: captured.missing() };
     let finished = match failed {
         None => recorder.finish(&account),
         Some(error) => {

@@ -1,6 +1,6 @@
 //! Arrays for NumPy, and a table for spreadsheets.
 
-use super::{ExportError, Whole, detectors};
+use super::{ExportError, Whole};
 use crate::files::FileError;
 use crate::files::measurement::{NOISE, PROVENANCE};
 use crate::files::npy::{Element, encode, encode_text, header};
@@ -13,15 +13,7 @@ use zip::{CompressionMethod, ZipWriter};
 
 /// Writes a `.npz` file. Its members are not compressed, because readings are noise for a
 /// compressor.
-///
-/// With `every_detector`, `d` and `frames` of a camera with several detectors have an axis for them.
-pub(super) fn npz(
-    whole: &Whole,
-    out: &Path,
-    every_detector: bool,
-    provenance: &Provenance,
-) -> Result<(), ExportError> {
-    let detectors = if every_detector { detectors::number(whole) } else { 1 };
+pub(super) fn npz(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
     write_in_pieces(out, |file| {
         let mut zip = Members { zip: ZipWriter::new(file), out };
         let rows = whole.source.measurements.rows();
@@ -29,11 +21,8 @@ pub(super) fn npz(
         let [m, count] = [h_row.len(), whole.frames()];
         zip.add("n", &encode(&[], &[rows.side().pixels() as i64]))?;
         zip.add("h_row", &encode(&[m], &h_row))?;
-        match detectors {
-            1 => zip.add("d", &encode(&[m], whole.source.measurements.values()))?,
-            _ => zip.add("d", &encode(&[detectors, m], &detectors::means(whole)?))?,
-        }
-        if let (1, Some(noise)) = (detectors, whole.source.measurements.noise()) {
+        zip.add("d", &encode(&[m], whole.source.measurements.values()))?;
+        if let Some(noise) = whole.source.measurements.noise() {
             zip.add(NOISE, &encode(&[], &[noise]))?;
         }
         zip.add("sequence", &encode(&[count], &whole.sequence))?;
@@ -42,10 +31,7 @@ pub(super) fn npz(
         zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
         zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
         zip.begin("frames")?;
-        match detectors {
-            1 => frames(whole, out, &mut zip.zip)?,
-            _ => detectors::frames(whole, out, &mut zip.zip)?,
-        }
+        frames(whole, out, &mut zip.zip)?;
         let wrong = |error: zip::result::ZipError| FileError::io(out, "write", error.into());
         zip.zip.finish().map_err(wrong)?;
         Ok(())

@@ -121,7 +121,7 @@ fn each(
     let method = Stacked::new(method);
     let image = |sum: &Integrated, frame: usize| -> Result<[Image; 2], ExportError> {
         let measurements = sum
-            .measurements_of(whole.detector, &setup, settling.as_ref(), whole.keep_leak)
+            .measurements(&setup, settling.as_ref(), whole.keep_leak)
             .map_err(|problem| whole.integrate(problem))?;
         let made = method.reconstruct(&measurements).map_err(problem(frame))?;
         let given = made.with_readings(&measurements);
@@ -133,7 +133,7 @@ fn each(
     let first = whole.device_time_us.first().map_or(0, |&time| time as u64);
     let mut frames = 0;
     hear_recording(recording, |heard, tally| {
-        if let Some(frame) = heard.frame_of(whole.detector) {
+        if let Some(frame) = heard.frame() {
             let number = frame.device_time_us.saturating_sub(first) / IMAGE_US;
             if let Some((before, time_ns)) = open
                 && before != number

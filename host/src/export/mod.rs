@@ -1,5 +1,5 @@
-//! Exports a recording for other programs: arrays for NumPy and Zarr, a table, a dataset in Parquet, a
-//! video, a recording with images.
+//! Exports a recording for other programs: arrays for NumPy, a table, a video, a recording with
+//! images.
 //!
 //! # Invariant
 //! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
@@ -8,31 +8,26 @@
 //! Frames are read one by one, so memory does not grow with the readings of a recording.
 
 mod arrays;
-mod detectors;
 #[cfg(feature = "enhance")]
 mod enhancing;
 mod mcap;
-mod parquet;
 #[cfg(feature = "pictures")]
 mod video;
-mod zarr;
 
-use crate::files::{FileError, npy};
+use crate::files::FileError;
 use crate::integrate::{IntegrateError, Integrated};
 use crate::provenance::Made;
 use crate::recording::{Recording, RecordingError};
-use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
-use crate::source::{self, Index, Source, SourceError, SourceOptions};
-use crate::tally::{Tally, hear_recording};
+use crate::source::{self, Source, SourceError, SourceOptions};
+use crate::tally::hear_recording;
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::words::count;
-use nirspi_wire::{Depth, DeviceMessage, Frame};
+use nirspi_wire::Frame;
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -46,12 +41,8 @@ pub enum Format {
     Npz,
     /// NumPy: one array.
     Npy,
-    /// A folder of arrays for Python's `zarr` and `xarray`.
-    Zarr,
     /// A table for spreadsheets.
     Csv,
-    /// The dataset form.
-    Parquet,
     /// A recording with images, for viewers of MCAP files.
     Mcap,
     /// A video.
@@ -64,9 +55,7 @@ impl Format {
     pub const ALL: &'static [Self] = &[
         Self::Npz,
         Self::Npy,
-        Self::Zarr,
         Self::Csv,
-        Self::Parquet,
         Self::Mcap,
         #[cfg(feature = "pictures")]
         Self::Apng,
@@ -78,9 +67,7 @@ impl Format {
         match self {
             Self::Npz => "npz",
             Self::Npy => "npy",
-            Self::Zarr => "zarr",
             Self::Csv => "csv",
-            Self::Parquet => "parquet",
             Self::Mcap => "mcap",
             #[cfg(feature = "pictures")]
             Self::Apng => "apng",
@@ -100,23 +87,16 @@ impl Format {
 
     /// Whether the file holds readings alone. A flat field corrects images, not readings.
     fn holds_readings(self) -> bool {
-        matches!(self, Self::Npz | Self::Npy | Self::Zarr | Self::Csv | Self::Parquet)
+        matches!(self, Self::Npz | Self::Npy | Self::Csv)
     }
 
     /// What a file of this format holds, in one line.
     #[must_use]
     pub fn about(self) -> &'static str {
         match self {
-            Self::Npz => {
-                "n, h_row, d (mean of all frames), frames (F, M), sequence, times; of several detectors D: d \
-                 (D, M), frames (F, D, M)"
-            }
+            Self::Npz => "n, h_row, d (mean of all frames), frames (F, M), sequence, times",
             Self::Npy => "the readings of each frame alone, (F, M)",
-            Self::Zarr => "a folder with the arrays of npz, for Python's zarr and xarray",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
-            Self::Parquet => {
-                "the dataset: one frame a row, with set-up, time, serial, depth, truth"
-            }
             Self::Mcap => "the recording with images for Foxglove and Rerun, 30 a second at most",
             #[cfg(feature = "pictures")]
             Self::Apng => "a video of the reconstructed frames",
@@ -142,14 +122,6 @@ impl FromStr for Format {
 pub struct ExportOptions {
     /// Whether to leave the leak between patterns uncorrected.
     pub keep_leak: bool,
-    /// The detector to export. Without one, NPZ files have every detector, and other files detector 0.
-    pub detector: Option<u8>,
-    /// What is known of the scene; a field of Parquet files.
-    pub scene: Option<String>,
-    /// Distance to the target in metres, if known; a field of Parquet files.
-    pub distance_m: Option<f64>,
-    /// An image of the scene as it is, `.npy` of shape (n, n); a field of Parquet files.
-    pub truth: Option<PathBuf>,
     /// The description of the camera: the geometry of the images and the place of depth maps in them,
     /// two channels of MCAP files.
     #[cfg(any(feature = "live", feature = "virtual-camera"))]
@@ -162,7 +134,7 @@ pub struct ExportOptions {
 /// What was exported.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Exported {
-    /// The file, or the folder of arrays.
+    /// The file.
     pub file: PathBuf,
     /// The form of the file.
     pub format: Format,
@@ -238,7 +210,7 @@ pub enum ExportError {
     },
 }
 
-/// Exports a recording to the file or folder `out`, which is whole or not made. The file holds its
+/// Exports a recording to the file `out`, which is whole or not made. The file holds its
 /// provenance, of the recording and of the program `made`; an `.npy` file has no place for it and gets
 /// a file `NAME.npy.json` beside it.
 ///
@@ -256,30 +228,19 @@ pub fn export(
     {
         return Err(ExportError::Itself(out.to_owned()));
     }
-    let source = SourceOptions {
-        keep_leak: options.keep_leak,
-        detector: match (options.detector, format) {
-            (Some(detector), _) => Some(Index::One(detector.into())),
-            // The file has every detector.
-            (None, Format::Npz) => Some(Index::One(0)),
-            (None, _) => None,
-        },
-        ..SourceOptions::default()
-    };
+    let source = SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
     let whole = Whole::read(input, &source)?;
     let provenance = &whole.source.taken.made(made);
     let mut images = 0;
     match format {
-        Format::Npz => arrays::npz(&whole, out, options.detector.is_none(), provenance)?,
+        Format::Npz => arrays::npz(&whole, out, provenance)?,
         Format::Npy => arrays::npy(&whole, out, provenance)?,
-        Format::Zarr => zarr::write(&whole, out, provenance)?,
         Format::Csv => arrays::csv(&whole, out, provenance)?,
-        Format::Parquet => parquet::write(&whole, out, options, provenance)?,
         Format::Mcap => images = mcap::write(&whole, out, options, provenance)?,
         #[cfg(feature = "pictures")]
         Format::Apng => images = video::apng(&whole, out, provenance)?,
     }
-    let bytes = size_of(out);
+    let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
     let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
     let (file, mut notes) = (out.to_owned(), whole.source.notes);
     if whole.source.flat_field.is_some() && format.holds_readings() {
@@ -292,85 +253,43 @@ pub fn export(
     Ok(Exported { file, format, bytes, frames, patterns, images, notes })
 }
 
-/// Bytes of a file, or of all files of a folder.
-fn size_of(path: &Path) -> u64 {
-    let Ok(entries) = std::fs::read_dir(path) else {
-        return std::fs::metadata(path).map_or(0, |file| file.len());
-    };
-    entries.filter_map(Result::ok).map(|entry| size_of(&entry.path())).sum()
-}
-
 /// A recording that was read once: the mean of its frames, and the numbers and times of the frames.
-pub(crate) struct Whole {
+struct Whole {
     path: PathBuf,
     keep_leak: bool,
-    /// The detector whose frames these are.
-    detector: u8,
-    identity: CameraIdentity,
     setup: MeasurementSetup,
     /// The mean of all frames.
-    pub(crate) source: Source,
+    source: Source,
     sequence: Vec<i64>,
     device_time_us: Vec<i64>,
     time_ns: Vec<i64>,
 }
 
 /// One frame of a recording.
-pub(crate) struct OneFrame<'w> {
+struct OneFrame {
     /// Number of the frame in the recording.
-    pub(crate) index: usize,
-    run: u16,
-    sweeps: u32,
-    pub(crate) measurements: Measurements,
-    /// The newest depth map, in mm.
-    depth_mm: Option<&'w [u16]>,
+    index: usize,
+    measurements: Measurements,
 }
 
 impl Whole {
-    /// Reads a recording at the detector that `options` choose.
-    pub(crate) fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
+    /// Reads a recording.
+    fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
         let mut recording = Recording::open(path)?;
-        let detector = options.detector_of(path, &recording.identity)?;
-        let (tally, mut numbers) = numbers_of(&mut recording)?;
-        let numbers = numbers.remove(&detector).unwrap_or_default();
-        Self::at(detector, numbers, path, options, &recording, &tally)
-    }
-
-    /// Reads a recording at the detector that `options` choose, or at each one. The file is read
-    /// once, whatever the number of detectors.
-    pub(crate) fn read_each(
-        path: &Path,
-        options: &SourceOptions,
-    ) -> Result<Vec<Self>, ExportError> {
-        if options.detector != Some(Index::All) {
-            return Ok(vec![Self::read(path, options)?]);
-        }
-        let mut recording = Recording::open(path)?;
-        let (tally, mut numbers) = numbers_of(&mut recording)?;
-        let at = |detector| {
-            let numbers = numbers.remove(&detector).unwrap_or_default();
-            Self::at(detector, numbers, path, options, &recording, &tally)
-        };
-        (0..recording.identity.detectors.max(1)).map(at).collect()
-    }
-
-    /// A recording of which every packet was heard, at one detector.
-    fn at(
-        detector: u8,
-        numbers: Numbers,
-        path: &Path,
-        options: &SourceOptions,
-        recording: &Recording,
-        tally: &Tally,
-    ) -> Result<Self, ExportError> {
-        let Numbers { sequence, device_time_us, time_ns } = numbers;
+        let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
+        let tally = hear_recording(&mut recording, |heard, tally| {
+            if let Some(frame) = heard.frame() {
+                sequence.push(tally.account().accounted() as i64 - 1);
+                device_time_us.push(frame.device_time_us as i64);
+                time_ns.push(heard.time_ns as i64);
+            }
+            Ok::<(), RecordingError>(())
+        })?;
         Ok(Self {
             path: path.to_owned(),
             keep_leak: options.keep_leak,
-            detector,
-            identity: recording.identity.clone(),
             setup: recording.setup.clone(),
-            source: source::of_sum(path, options, recording, detector, tally)?,
+            source: source::of_sum(path, options, &recording, &tally)?,
             sequence,
             device_time_us,
             time_ns,
@@ -387,32 +306,22 @@ impl Whole {
     }
 
     /// Reads the frames one by one.
-    pub(crate) fn each(
+    fn each(
         &self,
-        mut on: impl FnMut(&OneFrame<'_>) -> Result<(), ExportError>,
+        mut on: impl FnMut(&OneFrame) -> Result<(), ExportError>,
     ) -> Result<(), ExportError> {
         let mut recording = Recording::open(&self.path)?;
         let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
-        let mut depth: Option<Vec<u16>> = None;
         let mut index = 0;
         hear_recording(&mut recording, |heard, _| {
-            if let Ok(DeviceMessage::Depth(Depth { distances_mm, .. })) = heard.content {
-                depth = Some(distances_mm.iter().collect());
-            }
-            let Some(frame) = heard.frame_of(self.detector) else { return Ok(()) };
+            let Some(frame) = heard.frame() else { return Ok(()) };
             if index == self.frames() || setup != self.setup {
                 return Err(ExportError::Changed(self.path.clone()));
             }
             let measurements = alone(frame, &setup)
-                .measurements_of(self.detector, &setup, settling.as_ref(), self.keep_leak)
+                .measurements(&setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
-            on(&OneFrame {
-                index,
-                run: frame.run,
-                sweeps: frame.sweeps,
-                measurements,
-                depth_mm: depth.as_deref(),
-            })?;
+            on(&OneFrame { index, measurements })?;
             index += 1;
             Ok(())
         })?;
@@ -424,50 +333,12 @@ impl Whole {
     }
 }
 
-/// The numbers and times of the frames of one detector.
-#[derive(Default)]
-struct Numbers {
-    sequence: Vec<i64>,
-    device_time_us: Vec<i64>,
-    time_ns: Vec<i64>,
-}
-
-/// The account of a recording, and the numbers and times of the frames of each detector.
-fn numbers_of(recording: &mut Recording) -> Result<(Tally, BTreeMap<u8, Numbers>), RecordingError> {
-    let mut numbers: BTreeMap<u8, Numbers> = BTreeMap::new();
-    let tally = hear_recording(recording, |heard, tally| {
-        if let Some((detector, frame)) = heard.any_frame() {
-            let numbers = numbers.entry(detector).or_default();
-            numbers.sequence.push(number_of(tally, detector));
-            numbers.device_time_us.push(frame.device_time_us as i64);
-            numbers.time_ns.push(heard.time_ns as i64);
-        }
-        Ok::<(), RecordingError>(())
-    })?;
-    Ok((tally, numbers))
-}
-
-/// The number of the newest frame of this detector that arrived in order.
-fn number_of(tally: &Tally, detector: u8) -> i64 {
-    let (_, account) = tally.detector(detector).unwrap_or((tally.integrated(), tally.account()));
-    account.accounted() as i64 - 1
-}
-
 fn alone(frame: &Frame<'_>, setup: &MeasurementSetup) -> Integrated {
     let mut alone = Integrated::new(setup);
     alone.add(frame);
     alone
 }
 
-/// Reads an image of side `n` from a `.npy` file.
-fn read_truth(path: &Path, n: usize) -> Result<Vec<f32>, FileError> {
-    let stack = npy::read_stack(path)?;
-    if (stack.count, stack.height, stack.width) != (1, n, n) {
-        let found = format!("has shape ({}, {}, {})", stack.count, stack.height, stack.width);
-        return Err(FileError::field(path, "array", found, format!("one image, ({n}, {n})")));
-    }
-    Ok(stack.values)
-}
 /// The settings of the default method, with the shipped network where networks are built in, as those
 /// of `nirspi reconstruct`.
 fn settings() -> nirspi_recon::reconstruct::MethodSettings {

@@ -12,6 +12,8 @@
 
 #[cfg(feature = "training")]
 pub mod characters;
+#[cfg(not(target_family = "wasm"))]
+pub mod folder;
 #[cfg(feature = "pictures")]
 pub mod image;
 pub mod interrupt;
@@ -46,8 +48,6 @@ mod stored;
 mod testing;
 #[cfg(not(target_family = "wasm"))]
 mod text;
-#[cfg(not(target_family = "wasm"))]
-pub(crate) mod whole_folder;
 
 #[cfg(feature = "training")]
 pub(crate) use archive::encode as encode_archive;

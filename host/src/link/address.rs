@@ -1,11 +1,9 @@
-//! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]`,
-//! `replay:REC[,SPEED]`, and with the feature `zenoh` `zenoh:KEY[@ENDPOINT]`.
+//! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]` and
+//! `replay:REC[,SPEED]`.
 
 use super::usb::UsbError;
 use super::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
 use crate::recording::RecordingError;
-#[cfg(feature = "zenoh")]
-use crate::relay::zenoh::{ZenohAddress, ZenohError};
 use crate::replay::{ReplayAddress, ReplayLink};
 use crate::session::{Session, SessionError};
 use std::fmt;
@@ -32,9 +30,6 @@ pub enum CameraAddress {
     Usb(Option<String>),
     /// A recording that is played back as a camera.
     Replay(ReplayAddress),
-    /// A camera that another program runs and publishes.
-    #[cfg(feature = "zenoh")]
-    Zenoh(ZenohAddress),
 }
 
 impl FromStr for CameraAddress {
@@ -46,12 +41,6 @@ impl FromStr for CameraAddress {
             None if text == "usb" => Ok(Self::Usb(None)),
             Some(("usb", serial)) if !serial.is_empty() => Ok(Self::Usb(Some(serial.to_owned()))),
             Some(("replay", recording)) => recording.parse().map(Self::Replay),
-            #[cfg(feature = "zenoh")]
-            Some(("zenoh", address)) => address.parse().map(Self::Zenoh),
-            #[cfg(not(feature = "zenoh"))]
-            Some(("zenoh", _)) => Err("cameras over Zenoh are not in this program: build it with \
-                 --features zenoh"
-                .to_owned()),
             Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
             Some(("serial", port)) if !port.is_empty() => {
                 let speed = port.rsplit_once(':').and_then(|(path, baud)| {
@@ -78,8 +67,6 @@ impl fmt::Display for CameraAddress {
             Self::Usb(None) => f.write_str("usb"),
             Self::Usb(Some(serial)) => write!(f, "usb:{serial}"),
             Self::Replay(recording) => recording.fmt(f),
-            #[cfg(feature = "zenoh")]
-            Self::Zenoh(address) => address.fmt(f),
         }
     }
 }
@@ -111,10 +98,6 @@ pub enum OpenError {
     /// There is no such camera on USB, or the camera cannot be used.
     #[error(transparent)]
     Usb(#[from] UsbError),
-    /// There is no camera at the key.
-    #[cfg(feature = "zenoh")]
-    #[error(transparent)]
-    Zenoh(#[from] ZenohError),
     /// The device at the address does not answer as a camera.
     #[error("{camera}")]
     Session {
@@ -143,13 +126,6 @@ impl CameraAddress {
         let link: Box<dyn Link> = match self {
             Self::Replay(recording) => {
                 let link = ReplayLink::open(recording)?;
-                let recorded = link.recorded().clone();
-                let session = Session::open(Box::new(link)).map_err(session_error)?;
-                return Ok(session.with_recorded(recorded));
-            }
-            #[cfg(feature = "zenoh")]
-            Self::Zenoh(address) => {
-                let link = address.join()?;
                 let recorded = link.recorded().clone();
                 let session = Session::open(Box::new(link)).map_err(session_error)?;
                 return Ok(session.with_recorded(recorded));

@@ -1,10 +1,12 @@
 //! Makes images of measurements as they were read: one image for a folder of results, or any
 //! number of images by one prepared method.
 
+mod many;
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 mod one;
 mod solver;
 
+pub use many::{FileImage, ManyImages, Skipped, losses, many_images};
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 pub use one::{DropoutReport, OneError, OneImage, OneReport, one_image, write_image};
 pub use solver::{

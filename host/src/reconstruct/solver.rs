@@ -4,12 +4,10 @@ use crate::files::{FileError, npy};
 use crate::imaging::MethodReport;
 use crate::source::{FirstPatterns, Source};
 use nirspi_recon::reconstruct::{
-    Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction, Sparsity,
-    Strength,
+    Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction,
 };
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, MeasurementError, Measurements, Sampling};
-use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -110,65 +108,6 @@ impl Solver {
         Ok(Self { recipe, prepared: Mutex::default() })
     }
 
-    /// The recipe.
-    #[must_use]
-    pub fn recipe(&self) -> &Recipe {
-        &self.recipe
-    }
-
-    /// What images depend on beside the measurements, for keys: each setting by its name
-    /// (`tests::the_key_of_a_recipe_is_frozen`).
-    #[must_use]
-    pub fn settings(&self) -> Map<String, Value> {
-        let Recipe { method, settings, dictionary, first, sampling } = &self.recipe;
-        // The network belongs to the version of the program.
-        let MethodSettings {
-            basis,
-            dictionary: _,
-            sparsity,
-            residual,
-            as_printed,
-            non_negative,
-            strength,
-            backend,
-            network: _,
-        } = settings;
-        let first = match first {
-            FirstPatterns::LowestSequencies => "lowest sequencies".to_owned(),
-            FirstPatterns::Recorded => "recorded".to_owned(),
-            FirstPatterns::Of(order) => format!("order {order}"),
-        };
-        let settings = [
-            ("method", method.argument().into()),
-            ("sampling", sampling.to_string().into()),
-            ("first_patterns", first.into()),
-            ("dictionary", dictionary.as_deref().map(path_text).into()),
-            ("basis", basis.to_string().into()),
-            (
-                "sparsity",
-                match sparsity {
-                    Sparsity::CrossValidated { most, folds } => {
-                        json!({"cross_validated": {"most": most, "folds": folds}})
-                    }
-                    Sparsity::Fixed(atoms) => json!({"atoms": atoms}),
-                    Sparsity::Noise => "noise".into(),
-                },
-            ),
-            ("residual", (*residual).into()),
-            ("as_printed", (*as_printed).into()),
-            ("non_negative", (*non_negative).into()),
-            (
-                "strength",
-                match strength {
-                    Strength::CrossValidated { folds } => json!({"cross_validated": folds}),
-                    Strength::Fixed(strength) => json!({"fixed": strength}),
-                },
-            ),
-            ("backend", backend.name().into()),
-        ];
-        settings.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
-    }
-
     /// The method for images of this side, prepared once.
     ///
     /// # Errors
@@ -228,11 +167,6 @@ impl Solver {
     }
 }
 
-/// A path as text for keys.
-pub(crate) fn path_text(path: &Path) -> String {
-    path.to_string_lossy().into_owned()
-}
-
 /// Refuses an image with a pixel that is not finite.
 ///
 /// # Errors
@@ -271,44 +205,4 @@ pub fn not_read_words(places: &[usize]) -> String {
     let more = if places.len() > SHOWN { ", ..." } else { "" };
     let patterns = count_of(places.len(), "pattern");
     format!("not read: {patterns} left out, at [{}{more}] of those shown", first.join(", "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nirspi_recon::{Backend, Basis, Order};
-
-    /// A run of an archive that is interrupted goes on where the key is the same, so that another
-    /// compiler or a renamed field must not change the key without anybody noticing.
-    #[test]
-    fn the_key_of_a_recipe_is_frozen() {
-        let recipe = Recipe {
-            method: Method::OMP,
-            settings: MethodSettings {
-                basis: Basis::Haar,
-                sparsity: Sparsity::Fixed(40),
-                residual: 0.01,
-                backend: Backend::Cpu,
-                ..MethodSettings::default()
-            },
-            dictionary: None,
-            first: FirstPatterns::Of(Order::Random(7)),
-            sampling: Sampling::HALF,
-        };
-        let key = Value::Object(Solver::new(recipe).unwrap().settings());
-        let frozen = json!({
-            "method": "omp",
-            "sampling": "0.5",
-            "first_patterns": "order random:7",
-            "dictionary": null,
-            "basis": "haar",
-            "sparsity": {"atoms": 40},
-            "residual": 0.01,
-            "as_printed": false,
-            "non_negative": false,
-            "strength": {"cross_validated": 4},
-            "backend": "cpu",
-        });
-        assert_eq!(key, frozen);
-    }
 }

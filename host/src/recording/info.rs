@@ -27,11 +27,8 @@ pub struct RecordingInfo {
     pub host_seconds: f64,
     /// Number of packets.
     pub packets: u64,
-    /// The loss counters of detector 0, counted again.
+    /// The loss counters, counted again.
     pub frames: LossCounters,
-    /// The loss counters of each further detector, detector 1 first, counted again.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub further: Vec<LossCounters>,
     /// The account as the capture wrote it; `null` if the recording is cut short.
     pub account: Option<RunAccount>,
     /// Number of the recorded run.
@@ -89,7 +86,6 @@ impl RecordingInfo {
             host_seconds: seconds(times, 1e-9),
             packets: end.packets,
             frames: tally.account().counters(),
-            further: tally.further().iter().map(|found| found.account.counters()).collect(),
             account: end.account,
             run,
             patterns: setup.rows.len(),
@@ -126,9 +122,6 @@ impl fmt::Display for RecordingInfo {
         let (device, host) = (self.device_seconds, self.host_seconds);
         let packets = count(self.packets, "packet");
         writeln!(f, "{} in {packets}", self.frames)?;
-        for (counters, detector) in self.further.iter().zip(1..) {
-            writeln!(f, "detector {detector}: {counters}")?;
-        }
         write!(f, "{device:.6} s by the camera's clock, {host:.3} s by the computer's")?;
         match &self.account {
             None => write!(f, "\nno account at the end: the capture did not end by itself")?,
@@ -137,9 +130,6 @@ impl fmt::Display for RecordingInfo {
             }
             Some(account) if account.counters != self.frames => {
                 write!(f, "\nthe capture counted {}", account.counters)?;
-            }
-            Some(account) if account.further != self.further => {
-                write!(f, "\nthe capture counted other frames of further detectors")?;
             }
             Some(_) => {}
         }

@@ -93,17 +93,14 @@ pub fn recover(path: &Path, target: &Target) -> Result<Recovered, RecoverError> 
         tally.end(made);
     }
     let frames = tally.account().counters();
-    let further: Vec<_> = tally.further().iter().map(|found| found.account.counters()).collect();
     let account = match (&end.account, &end.cut_short) {
-        (Some(account), _) if account.counters == frames && account.further == further => {
-            account.clone()
-        }
+        (Some(account), _) if account.counters == frames => account.clone(),
         (_, damage) => {
             let damage = damage.as_deref().unwrap_or("a packet is damaged");
             let before = old.missing.map_or_else(String::new, |missing| format!("; {missing}"));
             let missing = Some(format!("recovered, {damage}{before}"));
             let made = tally.made();
-            RunAccount { counters: frames, further, asked: old.asked, made, missing }
+            RunAccount { counters: frames, asked: old.asked, made, missing }
         }
     };
     let recording =

@@ -6,12 +6,9 @@ use serde::{Deserialize, Serialize};
 /// The account of a run, as the capture wrote it.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct RunAccount {
-    /// The loss counters of detector 0.
+    /// The loss counters.
     #[serde(flatten)]
     pub counters: LossCounters,
-    /// The loss counters of each further detector, detector 1 first.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub further: Vec<LossCounters>,
     /// Frames requested; `None` if the run went on until stopped.
     #[serde(default)]
     pub asked: Option<u32>,

@@ -1,5 +1,4 @@
-//! The channels of a recording and of a live camera, and the schemas by which other programs read
-//! them.
+//! The channels of a recording, and the schemas by which other programs read them.
 //!
 //! Images, log and calibration have the schemas of Foxglove, which Foxglove and Rerun show
 //! (<https://github.com/foxglove/foxglove-sdk>, `schemas/proto`). Telemetry has one of our own.
@@ -53,11 +52,6 @@ impl Channel {
         Self::Spread,
         Self::Interval,
     ];
-
-    /// The channels of a live camera.
-    #[cfg(feature = "serve")]
-    pub(crate) const LIVE: [Self; 6] =
-        [Self::Telemetry, Self::Log, Self::Image, Self::Calibration, Self::Depth, Self::Enhanced];
 
     pub(crate) fn topic(self) -> &'static str {
         match self {

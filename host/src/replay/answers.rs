@@ -4,12 +4,12 @@ use super::Recorded;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{
-    Capabilities, Channel, ConfigField, ConfigProblem, Configuration, Identity, SIDE, State,
-    Status, Tail, Version,
+    Capabilities, ConfigField, ConfigProblem, Configuration, Identity, SIDE, State, Status, Tail,
+    Version,
 };
 
 /// The identity of the recorded camera in the wire's form.
-pub(crate) fn identity(camera: &CameraIdentity) -> Identity<'_> {
+pub(super) fn identity(camera: &CameraIdentity) -> Identity<'_> {
     let has = |name: &str| camera.capabilities.iter().any(|word| word == name);
     let known = Capabilities::NAMES.iter().filter(|(_, name)| has(name)).map(|&(known, _)| known);
     let capabilities = known.fold(Capabilities::default(), Capabilities::with);
@@ -25,7 +25,6 @@ pub(crate) fn identity(camera: &CameraIdentity) -> Identity<'_> {
         adc_bits: camera.adc_bits,
         wavelength_nm: camera.wavelength_nm,
         capabilities: Tail(is_newer.then_some(capabilities)),
-        detectors: Tail((camera.protocol >= Channel::SINCE).then_some(camera.detectors)),
     }
 }
 
@@ -37,7 +36,7 @@ fn version(text: &str) -> Version {
 }
 
 /// The status of a camera that has not measured yet. `run` is the number of the run before.
-pub(crate) fn status(run: u16) -> Status {
+pub(super) fn status(run: u16) -> Status {
     Status {
         state: State::Idle,
         fault: None,
@@ -58,7 +57,7 @@ pub(crate) fn status(run: u16) -> Status {
 }
 
 /// How a configuration differs from the recorded one. `None` means that they are the same.
-pub(crate) fn misfit(asked: &Configuration<'_>, recorded: &Recorded) -> Option<ConfigProblem> {
+pub(super) fn misfit(asked: &Configuration<'_>, recorded: &Recorded) -> Option<ConfigProblem> {
     let MeasurementSetup { rows, clocks_per_pattern, blanked, adc_latency, sweeps, .. } =
         &recorded.setup;
     let numbers = [

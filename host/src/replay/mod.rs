@@ -9,7 +9,7 @@
 //! replies (`a_capture_of_a_replay_has_the_packets_of_the_recording` in `host/tests/replay.rs`).
 //! With a run of fewer frames than recorded, the replay ends the run itself.
 
-pub(crate) mod answers;
+mod answers;
 mod link;
 mod stream;
 

@@ -4,7 +4,7 @@
 use super::Speed;
 use crate::recording::{Packet, Recording, RecordingError};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::{Answer, Channel, DeviceMessage, Event, EventKind, Reply, Status, encode, open};
+use nirspi_wire::{Answer, DeviceMessage, Event, EventKind, Reply, Status, encode, open};
 use std::time::{Duration, Instant};
 
 /// A run that is being played.
@@ -110,7 +110,7 @@ impl Playing {
                     }
                     continue;
                 }
-                Ok(DeviceMessage::Frame(frame) | DeviceMessage::Channel(Channel { frame, .. })) => {
+                Ok(DeviceMessage::Frame(frame)) => {
                     if frame.run == self.run {
                         if self.asked.is_some_and(|asked| frame.sequence >= asked) {
                             return Ok(self.end(frame.device_time_us));

@@ -106,7 +106,7 @@ pub fn stream(
     setup.with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))?;
     let run = session.status(&mut IgnorePackets)?.run.wrapping_add(1);
     let started = Instant::now();
-    let tally = Tally::new(setup, Some(run)).with_detectors(session.identity().detectors);
+    let tally = Tally::new(setup, Some(run));
     let mut counter = Counter { tally, bytes: 0, last_packet: started };
     session.command(request::Start(RunLength::Continuous), &mut counter)?;
     let (mut kept_alive, mut kept_alive_us) = (started, 0);

@@ -103,8 +103,6 @@ pub struct CameraLog {
     pub camera: CameraState,
     /// The newest events, oldest first.
     events: VecDeque<EventLine>,
-    /// Number of all events.
-    count: u64,
 }
 
 impl CameraLog {
@@ -121,7 +119,7 @@ impl CameraLog {
             measurement: None,
             said: Said::default(),
         };
-        let mut log = Self { camera, events: VecDeque::new(), count: 0 };
+        let mut log = Self { camera, events: VecDeque::new() };
         log.greeted(identity);
         log
     }
@@ -137,19 +135,6 @@ impl CameraLog {
         self.enter(Phase::Preparing, "preparing: latency and settling are measured".to_owned());
         self.camera.said.status = None;
         self.event(Level::Info, format!("connected to {} {}", identity.board, identity.serial));
-        let detectors = identity.detectors;
-        if detectors > 1 {
-            let text = format!("the camera has {detectors} detectors: images are of detector 0");
-            self.event(Level::Info, text);
-        }
-    }
-
-    /// The camera's name for other programs.
-    #[cfg(feature = "serve")]
-    pub fn name(&self) -> String {
-        let CameraState { identity, simulated, .. } = &self.camera;
-        let simulated = if *simulated { " (simulated)" } else { "" };
-        format!("nirspi {} {}{simulated}", identity.board, identity.serial)
     }
 
     /// Records that frames arrive from now on.
@@ -175,7 +160,6 @@ impl CameraLog {
     pub fn event(&mut self, level: Level, text: String) {
         let unix_ms = clock::since_1970().as_millis() as u64;
         self.events.push_back(EventLine { unix_ms, level, text });
-        self.count += 1;
         if self.events.len() > EVENTS {
             self.events.pop_front();
         }
@@ -184,14 +168,6 @@ impl CameraLog {
     /// The newest events, oldest first.
     pub fn events(&self) -> &VecDeque<EventLine> {
         &self.events
-    }
-
-    /// The events after the first `seen` ones, as far as they are kept, and the number of all
-    /// events.
-    #[cfg(feature = "serve")]
-    pub fn after(&self, seen: u64) -> (impl Iterator<Item = &EventLine>, u64) {
-        let new = usize::try_from(self.count.saturating_sub(seen)).unwrap_or(usize::MAX);
-        (self.events.iter().skip(self.events.len().saturating_sub(new)), self.count)
     }
 }
 
@@ -211,7 +187,6 @@ mod tests {
             adc_bits: 1,
             wavelength_nm: 1,
             capabilities: Vec::new(),
-            detectors: 1,
         };
         let mut log = CameraLog::new("test", &identity);
         for number in 1..=3 * EVENTS {
@@ -220,13 +195,5 @@ mod tests {
         let texts: Vec<&str> = log.events().iter().map(|event| event.text.as_str()).collect();
         let expected: Vec<String> = (2 * EVENTS + 1..=3 * EVENTS).map(|n| n.to_string()).collect();
         assert_eq!(texts, expected);
-        let all = 3 * EVENTS as u64 + 1;
-        let after = |seen| {
-            let (lines, count) = log.after(seen);
-            (lines.map(|line| line.text.clone()).collect::<Vec<_>>(), count)
-        };
-        assert_eq!(after(0), (expected.clone(), all));
-        assert_eq!(after(all - 2), (expected[EVENTS - 2..].to_vec(), all));
-        assert_eq!(after(all), (Vec::new(), all));
     }
 }

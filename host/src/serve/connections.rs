@@ -3,8 +3,7 @@
 //!
 //! One rule closes silent connections, half requests, and streams that are not read: a connection
 //! to which nothing could be written for [`SILENT`] is closed. An open event stream gets a state
-//! twice a second at least, so its connection stays open as long as its client reads. The connection
-//! of a viewer such as Foxglove counts as an event stream; it gets a ping each second.
+//! twice a second at least, so its connection stays open as long as its client reads.
 //!
 //! # Invariant
 //! At most [`MOST`] connections are open, [`MOST_OF_CLIENT`] of one client, and [`STREAMS_OF_CLIENT`]

@@ -1,20 +1,17 @@
-//! The servers of pages and viewers without a camera and without threads, for the search in
+//! The servers of pages without a camera and without threads, for the search in
 //! `tests/fuzz`: any bytes go in on a connection, and what the server says comes out.
 //!
 //! Compiled with `--cfg fuzzing` alone.
 
 use super::camera_log::CameraLog;
-use super::foxglove::Foxglove;
 use super::imaging::Picture;
 use super::settings::{Measuring, Offer, Settings};
 use super::stage::{Stage, StagedScene};
 use super::state::Published;
 use super::{Server, Shared, Token, http, lock};
-use crate::recording::Pinhole;
 use crate::scene::SceneSource;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
-use nirspi_optics::CameraModel;
 use nirspi_optics::rain::Air;
 use nirspi_recon::Order;
 use nirspi_recon::reconstruct::Method;
@@ -45,15 +42,13 @@ pub enum Place {
     Page,
     /// The page that demands [`TOKEN`].
     Guarded,
-    /// The server for viewers such as Foxglove.
-    Viewers,
 }
 
 /// Servers before a camera that never changes.
 pub struct Still {
     runtime: Runtime,
     shared: Arc<Shared>,
-    places: [SocketAddr; 3],
+    places: [SocketAddr; 2],
     /// Number of connections so far. Each comes from an address of its own, so that no client is
     /// slowed down for what others did.
     clients: u32,
@@ -86,8 +81,7 @@ impl Still {
         let air: Air = "none".parse().expect("clear air");
         let map = letter.load(SCENE_PX).expect("its map");
         let stage = Stage::of(Some(StagedScene { map, distance_m: 0.3, air }));
-        let mut shared = Shared::new(CameraLog::new("fuzzing", identity), offer, settings, stage);
-        shared.foxglove = Some(Foxglove::new(Pinhole::from(&CameraModel::default())));
+        let shared = Shared::new(CameraLog::new("fuzzing", identity), offer, settings, stage);
         let shared = Arc::new(shared);
         let picture = Picture::of_counts(1, vec![1.0; 1024], Some(vec![0.5; 4096]));
         let (publish, published) = watch::channel(Arc::new(Published {
@@ -99,14 +93,13 @@ impl Still {
         let runtime = runtime.expect("a runtime");
         let made = crate::provenance::Made::by("fuzzing", None, ["fuzzing"], 0);
         let bind = |token| Server::bind("127.0.0.1:0", token, &made).expect("a port");
-        let open = bind(None).with_foxglove("0").expect("a port");
+        let open = bind(None);
         let guarded = bind(Some(TOKEN.parse::<Token>().expect("a token")));
-        let viewers = open.foxglove.as_ref().map_or(open.address, |viewers| viewers.address);
-        let places = [open.address, guarded.address, viewers];
+        let places = [open.address, guarded.address];
         runtime.block_on(async {
             for server in [open, guarded] {
-                let routers = http::routers(server, &shared, &published);
-                drop(http::begin(routers).expect("a listener"));
+                let begun = http::begin(server, Arc::clone(&shared), published.clone());
+                drop(begun.expect("a listener"));
             }
         });
         Self { runtime, shared, places, clients: 0, _publish: publish }

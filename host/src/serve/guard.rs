@@ -10,7 +10,7 @@
 //! `tests::foreign_pages_are_refused`). The check comes before any other use of the request.
 
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Uri, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use std::net::{IpAddr, SocketAddr};
 use thiserror::Error;
 
@@ -25,15 +25,7 @@ pub enum Refused {
     /// A page of another site sent the request.
     #[error("a page of another site asked: open this server's own")]
     Origin,
-    /// The viewer is a page of an unknown site.
-    #[error(
-        "a page of an unknown site asked: start nirspi serve with --token, and open the address with the token there"
-    )]
-    Viewer,
 }
-
-/// The origins of viewers: Foxglove's page, and the desktop programs of Foxglove and Lichtblick.
-const VIEWERS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 
 /// Accepts a request or returns the reason for refusing. `listen` is where this server listens.
 ///
@@ -58,32 +50,6 @@ pub fn check(method: &Method, headers: &HeaderMap, listen: SocketAddr) -> Result
         return Err(Refused::Origin);
     }
     Ok(())
-}
-
-/// The same for the connection of a viewer such as Foxglove. Browsers let any page open a WebSocket to
-/// any address, and the pages of viewers come from elsewhere. Accepted are programs that are no
-/// browser, the desktop programs, [`VIEWERS`], pages of this machine, and with the token every page.
-///
-/// # Errors
-/// [`Refused`].
-pub fn check_viewer(
-    headers: &HeaderMap,
-    listen: SocketAddr,
-    has_token: bool,
-) -> Result<(), Refused> {
-    our_host(headers, listen)?;
-    if has_token || !headers.contains_key(header::ORIGIN) {
-        return Ok(());
-    }
-    let is_viewer = |origin: &str| {
-        let here = |uri: Uri| uri.host().is_some_and(is_this_machine);
-        VIEWERS.contains(&origin) || origin.parse::<Uri>().is_ok_and(here)
-    };
-    if only(headers, &header::ORIGIN).is_some_and(is_viewer) {
-        Ok(())
-    } else {
-        Err(Refused::Viewer)
-    }
 }
 
 /// The host name of a request, if it is this server's.
@@ -165,43 +131,6 @@ mod tests {
         assert_eq!(asked("127.0.0.1:80", &twice), Err(Refused::Host));
         assert_eq!(asked("0.0.0.0:80", &[("host", "lab.example")]), Err(Refused::Host));
         assert_eq!(asked("10.0.0.1:80", &[("host", "10.0.0.2")]), Err(Refused::Host));
-    }
-
-    #[test]
-    fn viewers_pass_from_their_own_sites_and_from_others_with_the_token_alone() {
-        let asked = |host: &str, origin: Option<&str>, has_token| {
-            let mut map = HeaderMap::new();
-            map.insert(header::HOST, host.parse().unwrap());
-            if let Some(origin) = origin {
-                map.insert(header::ORIGIN, origin.parse().unwrap());
-            }
-            check_viewer(&map, "127.0.0.1:8765".parse().unwrap(), has_token)
-        };
-        let here = "localhost:8765";
-        for origin in [
-            "https://app.foxglove.dev",
-            "file://",
-            "http://localhost:8080",
-            "http://127.0.0.1",
-            "http://[::1]:3000",
-        ] {
-            assert_eq!(asked(here, Some(origin), false), Ok(()), "{origin}");
-        }
-        assert_eq!(asked(here, None, false), Ok(()));
-        for origin in [
-            "null",
-            "",
-            "https://app.foxglove.dev.evil.example",
-            "http://app.foxglove.dev",
-            "http://localhost.evil.example",
-            "http://192.168.1.7",
-        ] {
-            assert_eq!(asked(here, Some(origin), false), Err(Refused::Viewer), "{origin}");
-            assert_eq!(asked(here, Some(origin), true), Ok(()), "{origin}");
-        }
-        for has_token in [false, true] {
-            assert_eq!(asked("evil.example:8765", None, has_token), Err(Refused::Host));
-        }
     }
 
     #[test]

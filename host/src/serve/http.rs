@@ -13,7 +13,7 @@ use super::imaging::Picture;
 use super::server::Server;
 use super::state::Published;
 use super::token::{self, Token};
-use super::{Shared, commands, foxglove, guard, lock, page};
+use super::{Shared, commands, guard, lock, page};
 use crate::causes::printable;
 use crate::files::image::encode_grey;
 use crate::files::npy;
@@ -32,7 +32,7 @@ use nirspi_nets::{deblur, fusion};
 use serde::Serialize;
 use std::convert::Infallible;
 use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -63,14 +63,14 @@ const HEADERS: [(HeaderName, &str); 5] = [
     (header::CACHE_CONTROL, "no-store"),
 ];
 
-/// What the handlers of one server use.
+/// What the handlers use.
 #[derive(Clone)]
-pub struct App {
-    pub shared: Arc<Shared>,
-    pub published: watch::Receiver<Arc<Published>>,
-    pub listen: SocketAddr,
-    pub token: Option<Token>,
-    pub made: Made,
+struct App {
+    shared: Arc<Shared>,
+    published: watch::Receiver<Arc<Published>>,
+    listen: SocketAddr,
+    token: Option<Token>,
+    made: Made,
 }
 
 /// Serves until `is_over`. Open requests are then cut off, because the page detects the end of the
@@ -81,13 +81,12 @@ pub fn run(
     published: watch::Receiver<Arc<Published>>,
     is_over: impl Fn() -> bool,
 ) -> io::Result<()> {
-    let routers = routers(server, &shared, &published);
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(async move {
-        let mut serving = begin(routers)?;
+        let serving = begin(server, shared, published)?;
         loop {
-            if let Some(ended) = serving.iter_mut().find(|serving| serving.is_finished()) {
-                return ended.await.map_err(io::Error::other)?;
+            if serving.is_finished() {
+                return serving.await.map_err(io::Error::other)?;
             }
             if is_over() {
                 return Ok(());
@@ -97,37 +96,19 @@ pub fn run(
     })
 }
 
-/// The listeners of a server, each with what it answers.
-pub(super) fn routers(
-    server: Server,
-    shared: &Arc<Shared>,
-    published: &watch::Receiver<Arc<Published>>,
-) -> Vec<(TcpListener, Router)> {
-    let Server { listener, token, made, address: listen, foxglove } = server;
-    let app = App { shared: Arc::clone(shared), published: published.clone(), listen, token, made };
-    let mut routers = Vec::new();
-    if let Some(foxglove) = foxglove {
-        let Server { listener, token, address: listen, .. } = *foxglove;
-        routers.push((listener, foxglove::routes(App { listen, token, ..app.clone() })));
-    }
-    routers.push((listener, routes(app)));
-    routers
-}
-
-/// Begins to serve on the runtime of this thread. The limits of connections hold for all listeners
-/// together.
+/// Begins to serve on the runtime of this thread.
 pub(super) fn begin(
-    routers: Vec<(TcpListener, Router)>,
-) -> io::Result<Vec<JoinHandle<io::Result<()>>>> {
-    let connections = Connections::default();
-    let mut serving = Vec::new();
-    for (listener, router) in routers {
-        listener.set_nonblocking(true)?;
-        let door = Door::new(tokio::net::TcpListener::from_std(listener)?, connections.clone());
-        let service = router.into_make_service_with_connect_info::<Peer>();
-        serving.push(tokio::spawn(async move { serve(door, service).await }));
-    }
-    Ok(serving)
+    server: Server,
+    shared: Arc<Shared>,
+    published: watch::Receiver<Arc<Published>>,
+) -> io::Result<JoinHandle<io::Result<()>>> {
+    let Server { listener, token, made, address: listen } = server;
+    listener.set_nonblocking(true)?;
+    let listener = tokio::net::TcpListener::from_std(listener)?;
+    let door = Door::new(listener, Connections::default());
+    let router = routes(App { shared, published, listen, token, made });
+    let service = router.into_make_service_with_connect_info::<Peer>();
+    Ok(tokio::spawn(async move { serve(door, service).await }))
 }
 
 /// The page and its interface for scripts.
@@ -204,7 +185,7 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
 }
 
 /// A response of one line, in which nothing of the request can steer a terminal.
-pub fn line(status: StatusCode, text: &impl ToString) -> Response {
+fn line(status: StatusCode, text: &impl ToString) -> Response {
     (status, format!("{}\n", printable(&text.to_string()))).into_response()
 }
 

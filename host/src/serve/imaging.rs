@@ -255,7 +255,7 @@ impl Picture {
     }
 }
 
-#[cfg(any(test, fuzzing))]
+#[cfg(fuzzing)]
 impl Picture {
     /// A picture of these counts, of which 2 are white.
     pub fn of_counts(number: u64, counts: Vec<f32>, enhanced: Option<Vec<f32>>) -> Self {
@@ -364,7 +364,6 @@ impl Studio {
             scene: shared.stage.state(),
             line: shared.line.as_ref().map(Line::state),
             viewers: shared.viewers(),
-            foxglove: shared.foxglove(),
             delays: lock(&shared.delays).state(now),
             overload: lock(&shared.overload).state(),
             events: log.events(),

@@ -12,8 +12,6 @@
 //! ([`settings::Change`]). Two threads compute; all of HTTP runs asynchronously on a third thread.
 //! Without threads and server, the same parts take turns ([`Turns`]).
 //!
-//! Viewers such as Foxglove get the same images over a protocol of their own (`foxglove.rs`).
-//!
 //! `docs/live-page.md` lists what each stage holds at most, and where a test says so. Each frame's
 //! delay to each stage is measured (`delays.rs`). If the computer is too slow for the camera, the page
 //! gives up images, then enhancement (`overload.rs`).
@@ -27,8 +25,6 @@ mod commands;
 #[cfg(feature = "serve")]
 mod connections;
 mod delays;
-#[cfg(feature = "serve")]
-mod foxglove;
 #[cfg(all(fuzzing, feature = "serve"))]
 pub mod fuzzing;
 #[cfg(feature = "serve")]
@@ -82,7 +78,6 @@ use overload::{Load, Overload, Shed};
 use settings::{Offer, Settings};
 use slot::Slot;
 use stage::Stage;
-use state::FoxgloveState;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -106,9 +101,6 @@ struct Shared {
     overload: Mutex<Overload>,
     over: AtomicBool,
     viewers: AtomicUsize,
-    /// What viewers such as Foxglove get, if there is a server for them.
-    #[cfg(feature = "serve")]
-    foxglove: Option<foxglove::Foxglove>,
 }
 
 impl Shared {
@@ -125,8 +117,6 @@ impl Shared {
             overload: Mutex::default(),
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
-            #[cfg(feature = "serve")]
-            foxglove: None,
         }
     }
 
@@ -136,17 +126,6 @@ impl Shared {
 
     fn viewers(&self) -> usize {
         self.viewers.load(Ordering::Relaxed)
-    }
-
-    /// The numbers of the viewers such as Foxglove; `None` without a server for them.
-    fn foxglove(&self) -> Option<FoxgloveState> {
-        #[cfg(feature = "serve")]
-        return self.foxglove.as_ref().map(|foxglove| {
-            let (viewers, images_sent, images_dropped) = foxglove.counts();
-            FoxgloveState { viewers, images_sent, images_dropped }
-        });
-        #[cfg(not(feature = "serve"))]
-        return None;
     }
 
     /// A frame that arrived at this moment, or its image, has passed this stage now.

@@ -22,8 +22,6 @@ pub enum BindError {
 /// A listening server.
 #[derive(Debug)]
 pub struct Server {
-    /// The server for viewers such as Foxglove.
-    pub(super) foxglove: Option<Box<Server>>,
     pub(super) listener: TcpListener,
     pub(super) token: Option<Token>,
     /// The program, for the provenance of pictures that a browser asks for.
@@ -45,48 +43,29 @@ impl Server {
             None if !address.ip().is_loopback() => Some(Token::random()?),
             token => token,
         };
-        Ok(Self { listener, token, made: made.clone(), address, foxglove: None })
-    }
-
-    /// Also listens for viewers such as Foxglove: at a port beside the page, or at `host:port`. The
-    /// token is that of the page. If the page has none and other machines reach the viewers' address,
-    /// that address gets a random one.
-    ///
-    /// # Errors
-    /// [`BindError`].
-    pub fn with_foxglove(mut self, place: &str) -> Result<Self, BindError> {
-        let address = match place.parse() {
-            Ok(port) => SocketAddr::new(self.address.ip(), port).to_string(),
-            Err(_) => place.to_owned(),
-        };
-        self.foxglove = Some(Box::new(Self::bind(&address, self.token.clone(), &self.made)?));
-        Ok(self)
+        Ok(Self { listener, token, made: made.clone(), address })
     }
 
     /// What a user must know to see this camera: the addresses with their tokens, and who else can open
     /// them.
     #[must_use]
     pub fn invitation(&self, camera: &impl Display) -> String {
-        let mut text = format!("open {} to see camera {camera}; Ctrl-C ends it", self.url("http"));
-        let foxglove = self.foxglove.as_deref();
-        if let Some(foxglove) = foxglove {
-            text += &format!("\nopen {} in Foxglove or Lichtblick", foxglove.url("ws"));
-        }
-        if let Some(notice) = self.notice().or_else(|| foxglove?.notice()) {
+        let mut text = format!("open {} to see camera {camera}; Ctrl-C ends it", self.url());
+        if let Some(notice) = self.notice() {
             text += &format!("\n{notice}");
         }
         text
     }
 
     /// The address, with the token if there is one.
-    fn url(&self, scheme: &str) -> String {
+    fn url(&self) -> String {
         let machine = match self.address.ip() {
             ip if ip.is_unspecified() => format!("localhost:{}", self.address.port()),
             _ => self.address.to_string(),
         };
         match &self.token {
-            Some(token) => format!("{scheme}://{machine}/?token={token}"),
-            None => format!("{scheme}://{machine}"),
+            Some(token) => format!("http://{machine}/?token={token}"),
+            None => format!("http://{machine}"),
         }
     }
 

@@ -129,22 +129,8 @@ pub struct State<'s> {
     pub overload: OverloadState,
     /// Number of connected pages.
     pub viewers: usize,
-    /// The viewers of `--foxglove`; `null` without that option.
-    pub foxglove: Option<FoxgloveState>,
     /// Events, oldest first.
     pub events: &'s VecDeque<EventLine>,
-}
-
-/// The numbers of the viewers such as Foxglove.
-#[cfg_attr(not(feature = "serve"), allow(dead_code, reason = "there is no server for viewers"))]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct FoxgloveState {
-    /// Number of connected viewers.
-    pub viewers: usize,
-    /// Images handed to the connections of viewers.
-    pub images_sent: u64,
-    /// Images that a viewer had subscribed and did not get, because its connection was slow.
-    pub images_dropped: u64,
 }
 
 /// The message to pages. Images are 32-bit floating-point numbers, little-endian, in base64.

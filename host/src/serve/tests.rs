@@ -1,7 +1,4 @@
-mod foxglove;
-
 use super::camera_log::Phase;
-use super::foxglove::Foxglove;
 use super::light::Leds;
 use super::look::RunSetup;
 use super::settings::Measuring;
@@ -11,7 +8,6 @@ use super::threads::{images, measure};
 use super::*;
 use crate::capture::{Calibration, CaptureError};
 use crate::link::{Link, Received};
-use crate::recording::Pinhole;
 use crate::session::{CameraIdentity, Session};
 use crate::setup::MeasurementSetup;
 use crate::virtual_camera::{OpticalFpga, VirtualCamera, VirtualOptics};
@@ -43,13 +39,7 @@ fn shared(identity: &CameraIdentity, scene: Option<StagedScene>) -> Arc<Shared> 
         Settings { method: "hadamard", enhance: false, frames: 8, measuring, ..settings() };
     let offer = Offer { base: Some(setup()), ..offer() };
     let log = CameraLog::new("test", identity);
-    let mut shared = Shared::new(log, offer, settings, Stage::of(scene));
-    shared.foxglove = Some(Foxglove::new(pinhole()));
-    Arc::new(shared)
-}
-
-fn pinhole() -> Pinhole {
-    Pinhole::from(&nirspi_optics::CameraModel::default())
+    Arc::new(Shared::new(log, offer, settings, Stage::of(scene)))
 }
 
 /// Waits until `is_so` returns true.
@@ -316,28 +306,17 @@ struct Paper {
     shared: Arc<Shared>,
     publish: watch::Sender<Arc<Published>>,
     address: std::net::SocketAddr,
-    /// Where viewers such as Foxglove connect, with the token.
-    foxglove: String,
     serving: JoinHandle<io::Result<()>>,
 }
 
 impl Paper {
     fn new() -> Self {
-        Self::with_token(None)
-    }
-
-    fn with_token(token: Option<Token>) -> Self {
         let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
         let (publish, published) = watch::channel(Arc::new(Published::default()));
         let server =
-            Server::bind("127.0.0.1:0", token, &crate::provenance::tests::provenance().made)
-                .unwrap()
-                .with_foxglove("0")
+            Server::bind("127.0.0.1:0", None, &crate::provenance::tests::provenance().made)
                 .unwrap();
         let address = server.address;
-        let invitation = server.invitation(&"test");
-        let foxglove = invitation.split_whitespace().find(|word| word.starts_with("ws://"));
-        let foxglove = foxglove.unwrap().to_owned();
         let serving = {
             let shared = Arc::clone(&shared);
             std::thread::spawn(move || {
@@ -345,7 +324,7 @@ impl Paper {
                 http::run(server, shared, published, || over.is_over())
             })
         };
-        Self { shared, publish, address, foxglove, serving }
+        Self { shared, publish, address, serving }
     }
 
     /// The numbers of the states that a browser gets.

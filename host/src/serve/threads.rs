@@ -9,7 +9,6 @@
 use super::camera::{End, EventLog, Live, Next, darken, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};
 use super::delays::DelayState;
-use super::foxglove::Foxglove;
 use super::imaging::Studio;
 use super::light::Leds;
 use super::overload::Shed;
@@ -19,7 +18,6 @@ use super::state::Published;
 use super::{CameraSource, Connected, Imaging, Ledger, Server, Shared, http, lock};
 use crate::capture::{CaptureError, observe};
 use crate::causes;
-use crate::recording::Pinhole;
 use crate::session::{Session, SessionError};
 use std::fmt;
 use std::io;
@@ -90,11 +88,7 @@ pub fn serve(
     let records = camera.record_to.is_some();
     let offer = Offer { records, base: Some(camera.setup.clone()), ..imaging.offer() };
     let stage = Stage::of(camera.scene.take());
-    let mut shared = Shared::new(log, offer, settings, stage);
-    if server.foxglove.is_some() {
-        shared.foxglove = Some(Foxglove::new(Pinhole::from(&camera.model)));
-    }
-    let shared = Arc::new(shared);
+    let shared = Arc::new(Shared::new(log, offer, settings, stage));
     let (publish, published) = watch::channel(Arc::new(Published::default()));
     let measuring = {
         let shared = Arc::clone(&shared);

@@ -39,7 +39,6 @@ fn identity(change: impl FnOnce(&mut CameraIdentity)) -> CameraIdentity {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Vec::new(),
-        detectors: 1,
     };
     change(&mut camera);
     camera

@@ -4,7 +4,7 @@ use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::rain::RainySpots;
 use nirspi_optics::{Chain, LedArray};
-use nirspi_wire::register::{BRING_UP_HZ, Design, FaultCode, Register, loopback, status};
+use nirspi_wire::register::{BRING_UP_HZ, Design, loopback};
 use std::collections::VecDeque;
 
 /// ADC clocks between two updates of the drops: one differential sweep, in which a 2 mm drop falls
@@ -29,9 +29,7 @@ pub type Wiring = Box<dyn FnMut(&mut LedArray, Lines) -> f32 + Send>;
 
 /// The golden model of the gateware between an LED array and a photodiode's ADC.
 pub struct OpticalFpga {
-    first: Detector,
-    /// Detectors beside the first one.
-    further: Vec<Detector>,
+    detector: Detector,
     wiring: Option<Wiring>,
     clock: u64,
     rain: Option<Rain>,
@@ -39,8 +37,7 @@ pub struct OpticalFpga {
     loopback: Option<VecDeque<Lines>>,
 }
 
-/// A detector behind an ADC of its own. The gateware of each further detector is a copy of the model that gets every access
-/// of the first one, so all show the same patterns in the same clocks.
+/// The gateware with the light that its detector gets.
 struct Detector {
     gateware: Gateware,
     array: LedArray,
@@ -62,7 +59,7 @@ impl Detector {
         converted(&mut self.chain, light)
     }
 
-    /// Advances a detector that sees the lines of its own gateware. A simulation spends most of its time here.
+    /// Advances the time. A simulation spends most of its time here.
     fn advance(&mut self, clocks: u64) {
         for _ in 0..clocks {
             // The ADC is not read outside a run, and drawing its noise is most of the work.
@@ -99,16 +96,9 @@ impl OpticalFpga {
     /// Powers up in front of a scene, with the interlock closed.
     #[must_use]
     pub fn new(array: LedArray, chain: Chain) -> Self {
-        let first = Detector::new(array, chain);
-        let (further, wiring, rain, loopback) = (Vec::new(), None, None, None);
-        Self { first, further, wiring, clock: 0, rain, loopback }
-    }
-
-    /// The same camera with a further detector, which has the light of `array`.
-    #[must_use]
-    pub fn with_detector(mut self, array: LedArray, chain: Chain) -> Self {
-        self.further.push(Detector::new(array, chain));
-        self
+        let detector = Detector::new(array, chain);
+        let (wiring, rain, loopback) = (None, None, None);
+        Self { detector, wiring, clock: 0, rain, loopback }
     }
 
     /// The bring-up design on the same boards: neither ADC nor LEDs.
@@ -118,32 +108,22 @@ impl OpticalFpga {
         gateware.set_adc_clock(Some(BRING_UP_HZ));
         gateware.set_interlock(true);
         let loopback = Some(VecDeque::from([Lines::default(); LOOPBACK_CLOCKS]));
-        let first = Detector { gateware, ..self.first };
-        Self { first, loopback, further: Vec::new(), rain: None, ..self }
+        let detector = Detector { gateware, ..self.detector };
+        Self { detector, loopback, rain: None, ..self }
     }
 
     /// Loses everything, as after a dip of the supply: registers, frames, LEDs off. The clock starts again at 0
     /// in the gateware; the time of the simulation goes on.
     pub fn reset(&mut self) {
-        for gateware in self.gatewares() {
-            *gateware = Gateware::new();
-            gateware.set_interlock(true);
-        }
+        self.detector.gateware = Gateware::new();
+        self.detector.gateware.set_interlock(true);
     }
 
     /// The next packet that the FPGA's parallel port sends, which then counts as sent.
     pub fn parallel_packet(&mut self) -> Option<Vec<u8>> {
-        let packet = self.first.gateware.outgoing()?;
-        self.first.gateware.sent();
+        let packet = self.detector.gateware.outgoing()?;
+        self.detector.gateware.sent();
         Some(packet)
-    }
-
-    fn all(&mut self) -> impl Iterator<Item = &mut Detector> {
-        std::iter::once(&mut self.first).chain(&mut self.further)
-    }
-
-    fn gatewares(&mut self) -> impl Iterator<Item = &mut Gateware> {
-        self.all().map(|detector| &mut detector.gateware)
     }
 
     /// Whether the FPGA lets LEDs shine now.
@@ -152,21 +132,19 @@ impl OpticalFpga {
         self.lines().enable
     }
 
-    /// The levels at the LED pins. Each detector's gateware can switch the LEDs off.
+    /// The levels at the LED pins.
     fn lines(&self) -> Lines {
-        let lines = self.first.gateware.lines();
-        let all_enable = self.further.iter().all(|detector| detector.gateware.lines().enable);
-        Lines { enable: lines.enable && all_enable, ..lines }
+        self.detector.gateware.lines()
     }
 
     /// The same camera with another frequency of the ADC's clock in Hz; `None` is no clock at all.
     #[must_use]
     pub fn adc_clock(mut self, hz: Option<u32>) -> Self {
-        self.gatewares().for_each(|gateware| gateware.set_adc_clock(hz));
+        self.detector.gateware.set_adc_clock(hz);
         self
     }
 
-    /// The sample of a clock in a run. The gateware of each further detector takes its own sample.
+    /// The sample of a clock in a run.
     fn sample(&mut self) -> AdcSample {
         let lines = self.lines();
         if let Some(late) = &mut self.loopback {
@@ -175,28 +153,19 @@ impl OpticalFpga {
             let code = loopback(seen.rows, seen.columns, seen.enable);
             return AdcSample { code, over_range: false };
         }
-        for detector in &mut self.further {
-            let sample = detector.sample(lines);
-            detector.gateware.tick(sample);
-        }
         match &mut self.wiring {
-            None => self.first.sample(lines),
+            None => self.detector.sample(lines),
             Some(wiring) => {
-                let light = wiring(&mut self.first.array, lines);
-                converted(&mut self.first.chain, light)
+                let light = wiring(&mut self.detector.array, lines);
+                converted(&mut self.detector.chain, light)
             }
         }
     }
 
-    /// One clock of all detectors.
+    /// One clock.
     fn tick(&mut self) {
-        let sample = if self.running() {
-            self.sample()
-        } else {
-            self.further.iter_mut().for_each(|detector| detector.gateware.tick(DARK));
-            DARK
-        };
-        self.first.gateware.tick(sample);
+        let sample = if self.running() { self.sample() } else { DARK };
+        self.detector.gateware.tick(sample);
     }
 
     /// The same camera with other wiring between FPGA and LEDs.
@@ -210,9 +179,7 @@ impl OpticalFpga {
     #[must_use]
     pub fn in_rain(mut self, spots: RainySpots, electrons_per_led: f64) -> Self {
         let reflectance = spots.reflectance();
-        for array in self.arrays() {
-            array.relight(&reflectance, electrons_per_led);
-        }
+        self.detector.array.relight(&reflectance, electrons_per_led);
         self.rain = Some(Rain { spots, electrons_per_led, seen: 0 });
         self
     }
@@ -229,29 +196,23 @@ impl OpticalFpga {
         rain.spots.advance(passed as f64 / f64::from(nirspi_wire::ADC_HZ));
         rain.seen = now;
         let (reflectance, electrons_per_led) = (rain.spots.reflectance(), rain.electrons_per_led);
-        for array in self.arrays() {
-            array.relight(&reflectance, electrons_per_led);
-        }
+        self.detector.array.relight(&reflectance, electrons_per_led);
         WEATHER_CLOCKS
-    }
-
-    fn arrays(&mut self) -> impl Iterator<Item = &mut LedArray> {
-        self.all().map(|detector| &mut detector.array)
     }
 }
 
 impl SimulatedFpga for OpticalFpga {
     fn advance(&mut self, clocks: u32) {
         let end = self.clock + u64::from(clocks);
-        if !self.first.gateware.has_adc_clock() {
+        if !self.detector.gateware.has_adc_clock() {
             self.clock = end;
         }
         // A camera without these needs none of their checks in each clock: docs/performance.md has its speed.
-        let plain = self.further.is_empty() && self.wiring.is_none() && self.loopback.is_none();
+        let plain = self.wiring.is_none() && self.loopback.is_none();
         while self.clock < end {
             let stretch = self.look_at_the_rain().min(end - self.clock);
             if plain {
-                self.first.advance(stretch);
+                self.detector.advance(stretch);
             } else {
                 (0..stretch).for_each(|_| self.tick());
             }
@@ -264,61 +225,39 @@ impl SimulatedFpga for OpticalFpga {
     }
 
     fn running(&self) -> bool {
-        self.first.gateware.running()
+        self.detector.gateware.running()
     }
 
     fn set_interlock(&mut self, closed: bool) {
-        self.gatewares().for_each(|gateware| gateware.set_interlock(closed));
+        self.detector.gateware.set_interlock(closed);
     }
 }
 
 impl FpgaBus for OpticalFpga {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
         // An address without a register reads as zero, as on the real port.
-        let mut answer = self.first.gateware.read(address).unwrap_or(0);
-        for detector in &mut self.further {
-            let own = detector.gateware.read(address).unwrap_or(0);
-            // A fault that one detector has found, such as light over its range, is a fault of the camera.
-            match Register::at(address) {
-                Some(Register::Status) => answer |= own & status::FAULT,
-                Some(Register::Fault) if answer == FaultCode::None as u32 => answer = own,
-                _ => {}
-            }
-        }
-        Ok(answer)
+        Ok(self.detector.gateware.read(address).unwrap_or(0))
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
-        for gateware in self.gatewares() {
-            gateware.write(address, value);
-        }
+        self.detector.gateware.write(address, value);
         Ok(())
     }
 
-    fn detectors(&self) -> u8 {
-        self.further.len().try_into().map_or(u8::MAX, |further: u8| further.saturating_add(1))
-    }
-
-    fn channel(&mut self, detector: u8) -> Result<Option<&[u8]>, BusError> {
-        let of_further = usize::from(detector).checked_sub(1);
-        let found = of_further.and_then(|at| self.further.get_mut(at));
-        Ok(found.and_then(|detector| detector.gateware.frame()))
-    }
-
     fn frame_ready(&mut self) -> bool {
-        self.first.gateware.frame_ready()
+        self.detector.gateware.frame_ready()
     }
 
     fn raw_ready(&mut self) -> bool {
-        self.first.gateware.raw_ready()
+        self.detector.gateware.raw_ready()
     }
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.first.gateware.frame())
+        Ok(self.detector.gateware.frame())
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.first.gateware.raw())
+        Ok(self.detector.gateware.raw())
     }
 }
 
@@ -328,7 +267,7 @@ mod tests {
     use crate::virtual_camera::VirtualOptics;
     use nirspi_optics::Scene;
     use nirspi_optics::rain::Air;
-    use nirspi_wire::register::{control, mode};
+    use nirspi_wire::register::{Register, control, mode};
 
     /// Frames of a run that is advanced in stretches of these lengths.
     fn frames(mut fpga: OpticalFpga, stretches: &[u32]) -> Vec<Vec<u8>> {

@@ -46,7 +46,6 @@ use nirspi_mcu::{
     Progress,
 };
 use nirspi_optics::SimulatedDepth;
-use nirspi_optics::camera::MOST_FURTHER_DETECTORS;
 use nirspi_wire::{Capabilities, Version};
 use std::ops::Range;
 
@@ -55,6 +54,8 @@ use std::ops::Range;
 const PACKETS_BYTES: usize = 1 << 18;
 /// Room that a frame claims: with the zeros around a packet of the FPGA.
 const FRAME_BYTES: usize = nirspi_wire::ready::MAX_READ_BYTES;
+/// Frames for which the memory of packets has room until it counts as full.
+const SPARE_FRAMES: usize = 8;
 const _: () = assert!(FRAME_BYTES >= nirspi_wire::packet::MAX_DEVICE_PACKET);
 /// Device time between depth maps: 15 Hz, the rate of 8 x 8 time-of-flight sensors.
 const DEPTH_PERIOD: Micros = Micros(66_667);
@@ -99,10 +100,10 @@ impl PacketsOut {
         self.bytes.get(self.sent..self.committed).unwrap_or(&[])
     }
 
-    /// Whether there is no room for a further frame of every detector.
+    /// Whether there is no room for [`SPARE_FRAMES`] more.
     #[must_use]
     pub fn is_full(&self) -> bool {
-        self.waiting().len() + (1 + MOST_FURTHER_DETECTORS) * FRAME_BYTES > PACKETS_BYTES
+        self.waiting().len() + SPARE_FRAMES * FRAME_BYTES > PACKETS_BYTES
     }
 
     /// Removes the first `length` waiting bytes, which were sent.

@@ -343,16 +343,8 @@ impl VirtualOptics {
     pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, VirtualOpticsError> {
         let electrons_per_led = self.budget.electrons_per_led;
         let gains = self.camera.led_gains();
-        let array =
-            |gains: &[f32]| LedArray::new(&self.footprint, electrons_per_led).with_gains(gains);
-        let mut fpga = OpticalFpga::new(array(&gains), Chain::new(self.chain, seed)?);
-        for detector in 1..self.camera.detectors() {
-            let seen = self.camera.detector_gains(detector, self.distance_mm).unwrap_or_default();
-            let both: Vec<f32> = gains.iter().zip(seen).map(|(led, seen)| led * seen).collect();
-            // Each detector has noise of its own.
-            let own_seed = seed.wrapping_add((detector as u64) << 32);
-            fpga = fpga.with_detector(array(&both), Chain::new(self.chain, own_seed)?);
-        }
+        let array = LedArray::new(&self.footprint, electrons_per_led).with_gains(&gains);
+        let fpga = OpticalFpga::new(array, Chain::new(self.chain, seed)?);
         Ok(match self.spots(seed)? {
             Some(spots) => fpga.in_rain(spots, electrons_per_led),
             None => fpga,

@@ -36,8 +36,8 @@ pub struct PrecomputedFpga<F> {
 
 /// A run of repeated frames.
 struct Run {
-    /// The computed frames: each is the frame of every detector.
-    frames: Vec<Vec<Vec<u8>>>,
+    /// The computed frames.
+    frames: Vec<Vec<u8>>,
     frame_clocks: u64,
     /// Sequence number of the offered frame.
     sequence: u32,
@@ -45,7 +45,7 @@ struct Run {
     length: u32,
     ended: bool,
     first_clock: u64,
-    /// Whether the offered frames already contain the sequence number.
+    /// Whether the offered frame already contains the sequence number.
     stamped: bool,
 }
 
@@ -58,16 +58,16 @@ impl Run {
         self.sequence as usize % self.frames.len()
     }
 
-    /// The offered frame of a detector, with header and checksum of this repetition.
-    fn stamp(&mut self, detector: usize) -> Option<&[u8]> {
+    /// The offered frame, with header and checksum of this repetition.
+    fn stamp(&mut self) -> Option<&[u8]> {
         let (slot, sequence) = (self.slot(), self.sequence);
         let clock = self.first_clock + u64::from(sequence) * self.frame_clocks;
-        let frames = self.frames.get_mut(slot)?;
+        let frame = self.frames.get_mut(slot)?;
         if !self.stamped {
-            frames.iter_mut().try_for_each(|frame| stamp(frame, sequence, clock))?;
+            stamp(frame, sequence, clock)?;
             self.stamped = true;
         }
-        frames.get(detector).map(Vec::as_slice)
+        Some(frame)
     }
 }
 
@@ -102,12 +102,7 @@ impl<F: SimulatedFpga> PrecomputedFpga<F> {
         {
             self.model.advance(64);
             if self.model.frame_ready() {
-                let mut made: Vec<_> =
-                    self.model.frame()?.map(<[u8]>::to_vec).into_iter().collect();
-                for detector in 1..self.model.detectors() {
-                    made.extend(self.model.channel(detector)?.map(<[u8]>::to_vec));
-                }
-                frames.extend((!made.is_empty()).then_some(made));
+                frames.extend(self.model.frame()?.map(<[u8]>::to_vec));
                 self.model.write(Register::Control.address(), control::RELEASE)?;
             }
         }
@@ -133,8 +128,8 @@ impl<F: SimulatedFpga> PrecomputedFpga<F> {
 }
 
 /// Clocks from one frame to the next in a sequence of frames.
-fn frame_clocks(frames: &[Vec<Vec<u8>>]) -> Option<u64> {
-    let clock = |made: &Vec<Vec<u8>>| Some(FpgaFrame::parse_header(made.first()?)?.clock);
+fn frame_clocks(frames: &[Vec<u8>]) -> Option<u64> {
+    let clock = |made: &[u8]| Some(FpgaFrame::parse_header(made)?.clock);
     match frames {
         [] => None,
         [_] => Some(0),
@@ -213,16 +208,8 @@ impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
     }
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
-        self.channel(0)
-    }
-
-    fn detectors(&self) -> u8 {
-        self.model.detectors()
-    }
-
-    fn channel(&mut self, detector: u8) -> Result<Option<&[u8]>, BusError> {
         let run = self.run.as_mut().filter(|run| run.offers());
-        Ok(run.and_then(|run| run.stamp(detector.into())))
+        Ok(run.and_then(Run::stamp))
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {

@@ -36,9 +36,6 @@ pub struct ServeOptions {
     pub drop_when_full: bool,
     /// Whether the camera's time runs no faster than the clock on the wall.
     pub real_time: bool,
-    /// By how much the camera's clock gains on the clock on the wall, in millionths, with
-    /// [`real_time`](Self::real_time): the error of a simulated oscillator. Quartz has 10 to 100.
-    pub clock_error_ppm: f64,
 }
 
 /// Keeps the camera's time from running faster than the clock on the wall.
@@ -50,13 +47,11 @@ struct Pace {
     /// The moment on the wall that is `clocks` of the camera.
     since: Instant,
     clocks: u64,
-    /// Length of an ADC clock on the wall.
-    ns_per_clock: f64,
 }
 
 /// A camera that is further behind the clock on the wall does not make up for the delay.
 const LATE: Duration = Duration::from_millis(100);
-/// Length of an ADC clock by the camera's own oscillator.
+/// Length of an ADC clock.
 const NS_PER_CLOCK: f64 = 1e9 / nirspi_wire::ADC_HZ as f64;
 /// The longest sleep of a camera that is ahead, so that its host is heard.
 const AHEAD_WAIT: Duration = Duration::from_micros(500);
@@ -65,7 +60,7 @@ impl Pace {
     /// How far the camera is ahead of the clock on the wall; `None` if it is not ahead.
     fn ahead(&mut self, now: Instant, clocks: u64) -> Option<Duration> {
         let passed = clocks.saturating_sub(self.clocks);
-        let light = Duration::from_nanos((passed as f64 * self.ns_per_clock) as u64);
+        let light = Duration::from_nanos((passed as f64 * NS_PER_CLOCK) as u64);
         let wall = now.saturating_duration_since(self.since);
         if wall > light + LATE {
             (self.since, self.clocks) = (now, clocks);
@@ -186,8 +181,7 @@ fn converse<F: SimulatedFpga>(
     stream.set_nonblocking(true)?;
     let mut buffer = vec![0; 1 << 16];
     let (mut heard, mut greeted) = (Instant::now(), false);
-    let ns_per_clock = NS_PER_CLOCK / (1.0 + options.clock_error_ppm * 1e-6);
-    let mut pace = Pace { since: heard, clocks: camera.fpga().clock(), ns_per_clock };
+    let mut pace = Pace { since: heard, clocks: camera.fpga().clock() };
     while !stop.load(Ordering::Relaxed) {
         let another_waits = knock();
         let silent = heard.elapsed();
@@ -290,23 +284,13 @@ mod tests {
         let start = Instant::now();
         let after = |ms| start + Duration::from_millis(ms);
         let ms = u64::from(nirspi_wire::ADC_HZ) / 1000;
-        let mut pace = Pace { since: start, clocks: 7, ns_per_clock: NS_PER_CLOCK };
+        let mut pace = Pace { since: start, clocks: 7 };
         assert_eq!(pace.ahead(after(0), 7), None);
         assert_eq!(pace.ahead(after(10), 7 + 30 * ms), Some(Duration::from_millis(20)));
         assert_eq!(pace.ahead(after(90), 7 + 30 * ms), None, "a short delay");
         assert_eq!(pace.ahead(after(91), 7 + 95 * ms), Some(Duration::from_millis(4)), "made up");
         assert_eq!(pace.ahead(after(500), 7 + 95 * ms), None, "a long delay");
         assert_eq!(pace.ahead(after(500), 7 + 97 * ms), Some(Duration::from_millis(2)), "lost");
-    }
-
-    #[test]
-    fn a_camera_whose_clock_is_fast_makes_more_of_a_second() {
-        let start = Instant::now();
-        let second = u64::from(nirspi_wire::ADC_HZ);
-        let ns_per_clock = NS_PER_CLOCK / (1.0 + 2000e-6);
-        let mut pace = Pace { since: start, clocks: 0, ns_per_clock };
-        let ahead = pace.ahead(start, second).unwrap();
-        assert!(ahead.abs_diff(Duration::from_secs_f64(1.0 / 1.002)) < Duration::from_nanos(2));
     }
 
     const HELLO: Command<'_> = Command::Hello { protocol: version::CURRENT };

@@ -29,7 +29,6 @@ fn hello_tells_who_the_device_is() {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Tail(Some(Capabilities::LOAD_GATEWARE.with(Capabilities::NARROW_SAMPLES))),
-        detectors: Tail(Some(1)),
     };
     assert_eq!(identity, expected);
 }

@@ -31,8 +31,6 @@ pub struct FakeFpga {
     pub two_wait: bool,
     /// The frame that waits behind the delivered one, and what the signal meter will ask of it.
     pub behind: Option<(Vec<u8>, (u64, u32))>,
-    /// Frames of further detectors, which stay until the test replaces them.
-    pub channels: Vec<Vec<u8>>,
     /// Samples over range in every frame.
     pub over_range: u32,
     /// What is added to the positive sums of a frame, by its sequence.
@@ -99,7 +97,6 @@ impl Default for FakeFpga {
             frame: None,
             two_wait: false,
             behind: None,
-            channels: Vec::new(),
             over_range: 0,
             noise_of: |_, _| 0,
             scratch_of: Rc::new(|word| word),
@@ -421,14 +418,6 @@ impl FpgaBus for FakeFpga {
             return Ok(None);
         }
         if self.dead { Err(BusError::Timeout) } else { Ok(self.frame.as_deref()) }
-    }
-
-    fn detectors(&self) -> u8 {
-        1 + self.channels.len() as u8
-    }
-
-    fn channel(&mut self, detector: u8) -> Result<Option<&[u8]>, BusError> {
-        Ok(self.channels.get(usize::from(detector) - 1).map(Vec::as_slice))
     }
 
     fn keep(&mut self) -> bool {

@@ -2,7 +2,6 @@
 
 mod access;
 mod bitstreams;
-mod channels;
 mod commands;
 mod configuring;
 mod crash;

@@ -8,10 +8,8 @@ use nirspi_wire::ready::{self, MAX_NARROW_SAMPLES, MAX_SUMMED_SAMPLES};
 use nirspi_wire::register::{Register, mode};
 use nirspi_wire::samples::Width::{self, Bits24, Bits32};
 use nirspi_wire::{
-    Answer, Capabilities, Command, Configuration, DeviceMessage, Frame, RunLength, Signal, Tail,
-    version,
+    Answer, Capabilities, Command, Configuration, Frame, RunLength, Signal, Tail, version,
 };
-use std::vec;
 use std::vec::Vec;
 
 /// Gateware that makes no packets, packets of 32 bits alone, and packets of both widths.
@@ -140,25 +138,6 @@ fn each_configuration_asks_for_itself() {
     bench.ask(Command::Hello { protocol: 3 }).unwrap();
     bench.ask(Command::Configure(ASKING)).unwrap();
     assert_eq!(width(&run(bench)), Bits32);
-}
-
-/// Their frames are packed by the firmware, with samples of 32 bits.
-#[test]
-fn several_detectors_have_samples_of_32_bits() {
-    let mut bench = Bench::new();
-    bench.fpga.channels = vec![Vec::new()];
-    bench.fpga.make_packets();
-    bench.ask(Command::Hello { protocol: version::CURRENT }).unwrap();
-    bench.ask(Command::Configure(ASKING)).unwrap();
-    assert_eq!(bench.fpga.get(Register::Mode) & (mode::PACKETS | mode::NARROW), 0);
-    bench.ask(Command::Start(RunLength::Continuous)).unwrap();
-    bench.fpga.make_frame();
-    bench.fpga.channels = vec![bench.fpga.frame.clone().unwrap()];
-    bench.after(100);
-    let heard = bench.heard();
-    let both: Vec<_> = heard.iter().filter_map(DeviceMessage::frame).collect();
-    assert_eq!(both.len(), 2);
-    assert!(both.iter().all(|(_, frame)| frame.samples.width() == Bits32), "{both:?}");
 }
 
 /// What the signal meter says of light that flickers, with samples of this width.

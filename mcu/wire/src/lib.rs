@@ -41,14 +41,13 @@ pub mod walsh;
 
 mod crc32;
 mod display;
-mod identity;
 mod stuffing;
 mod tail;
 
 pub use crc32::{Crc32, crc32};
 pub use message::{
-    Answer, Capabilities, Channel, Command, ConfigField, ConfigProblem, Configuration, CrashReport,
-    Depth, DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
+    Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth,
+    DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
     PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource,
     SelfTestReport, Signal, State, Status, Version,
 };

@@ -5,7 +5,6 @@
 //! appended, everything else stays ([`version`](crate::version) has the rules; `tests/frozen` holds the bytes).
 
 use crate::Tail;
-use crate::identity::Received;
 use crate::samples::{Block, Samples, Width, Words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -186,9 +185,6 @@ pub enum DeviceMessage<'a> {
     /// A report of the crash that ended the firmware's last start: once, after the first `Hello`.
     #[serde(borrow)]
     Crash(CrashReport<'a>),
-    /// The measurement of a further detector under the patterns of a `Frame`: with the run, sequence number and device
-    /// time of that `Frame`, and right after it. Since version 3.
-    Channel(Channel<'a>),
 }
 
 impl<'a> DeviceMessage<'a> {
@@ -197,25 +193,11 @@ impl<'a> DeviceMessage<'a> {
     pub const fn since(&self) -> u16 {
         match self {
             Self::Reply(Reply { outcome: Err(Refusal::Unknown), .. }) => 2,
-            Self::Frame(Frame { samples, .. })
-            | Self::Channel(Channel { frame: Frame { samples, .. }, .. })
-                if matches!(samples.width(), Width::Bits24) =>
-            {
+            Self::Frame(Frame { samples, .. }) if matches!(samples.width(), Width::Bits24) => {
                 Width::NARROW_SINCE
             }
             Self::Reply(_) | Self::Frame(_) | Self::Raw(_) | Self::Depth(_) | Self::Crash(_) => 1,
             Self::Event(event) => event.kind.since(),
-            Self::Channel(_) => Channel::SINCE,
-        }
-    }
-
-    /// The frame in this message, with the number of its detector.
-    #[must_use]
-    pub const fn frame(&self) -> Option<(u8, &Frame<'a>)> {
-        match self {
-            Self::Frame(frame) => Some((0, frame)),
-            Self::Channel(Channel { detector, frame }) => Some((*detector, frame)),
-            _ => None,
         }
     }
 }
@@ -253,7 +235,6 @@ pub enum Answer<'a> {
 
 /// Who the device is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Received<'a>")]
 pub struct Identity<'a> {
     /// Protocol version of the session; the device's own where there is no session. The first field in every version.
     pub protocol: u16,
@@ -275,8 +256,6 @@ pub struct Identity<'a> {
     pub wavelength_nm: u16,
     /// What the device can do. Since version 2.
     pub capabilities: Tail<Capabilities>,
-    /// Number of detectors, at least 1; a device whose tail is absent has one. Since version 3.
-    pub detectors: Tail<u8>,
 }
 
 /// What a camera can do, one bit each.
@@ -498,21 +477,6 @@ pub struct Frame<'a> {
     /// Summed ADC counts, one a pattern shown; of 24 bits in a run for which the host asked for them.
     #[serde(borrow)]
     pub samples: Samples<'a>,
-}
-
-/// The frame of a further detector. A session of an older version carries the frames of detector 0 alone.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Channel<'a> {
-    /// Number of the detector: 1, 2, ... Detector 0 sends `Frame`.
-    pub detector: u8,
-    /// What the detector measured.
-    #[serde(borrow)]
-    pub frame: Frame<'a>,
-}
-
-impl Channel<'_> {
-    /// The first protocol version that has further detectors.
-    pub const SINCE: u16 = 3;
 }
 
 /// A piece of a burst of plain ADC samples.

@@ -12,6 +12,7 @@
 //!   refuse a variant that they do not know. A camera sends them only to a host that asks for them.
 //! * A camera answers a request that it does not know with [`Refusal::Unknown`](crate::Refusal::Unknown). A host counts a
 //!   message that it does not know and goes on.
+//! * Version 3 was of cameras with several detectors, which no gateware has. It adds nothing to version 2.
 //! * A recording names the version of its session. Every program reads the recordings of all versions from [`MIN`] on.
 //!
 //! # Greeting

@@ -2,7 +2,7 @@
 --
 -- Use it once:      wireshark -X lua_script:mcu/wire/wireshark/nirspi.lua
 -- Install it:       copy it into Wireshark's folder of personal Lua plugins (Help, About, Folders).
--- Filters:          nirspi.message, nirspi.command, nirspi.outcome, nirspi.event, nirspi.sequence, nirspi.detector, nirspi.damaged ...
+-- Filters:          nirspi.message, nirspi.command, nirspi.outcome, nirspi.event, nirspi.sequence, nirspi.damaged ...
 --
 -- A packet is COBS(postcard(message) ++ CRC-32) ++ 0x00. The messages are those of mcu/wire/src/message.rs; the test
 -- mcu/wire/tests/frozen/dissector.rs holds the lists of names below equal to it, and check.py beside this file runs the
@@ -18,7 +18,7 @@ local RunLength = { "Continuous", "Frames" }
 local RebootInto = { "Application", "Bootloader" }
 local SampleSource = { "Detector", "TestPattern" }
 local PatternOrder = { "Natural", "Sequency", "Table" }
-local DeviceMessage = { "Reply", "Frame", "Raw", "Depth", "Event", "Crash", "Channel" }
+local DeviceMessage = { "Reply", "Frame", "Raw", "Depth", "Event", "Crash" }
 local Answer = { "Hello", "Done", "Status", "SelfTest", "Register", "Gateware" }
 local Refusal = { "Protocol", "State", "Configuration", "Fault", "NoSuchRegister", "RawLength", "GatewareOffset", "GatewareCrc", "Unsupported", "Bus", "Unknown" }
 local ConfigProblem = { "OutOfRange", "OrderEntry" }
@@ -39,7 +39,6 @@ local fields = {
     protocol = ProtoField.uint16("nirspi.protocol", "Protocol version"),
     run = ProtoField.uint16("nirspi.run", "Run"),
     sequence = ProtoField.uint32("nirspi.sequence", "Sequence"),
-    detector = ProtoField.uint8("nirspi.detector", "Detector"),
     samples = ProtoField.uint32("nirspi.samples", "Samples"),
     tail = ProtoField.bytes("nirspi.tail", "Bytes of a newer version"),
 }
@@ -179,7 +178,6 @@ local answers = {
         r:byte("adc_bits")
         r:number("wavelength_nm")
         if r:left() > 0 then r:number("capabilities") end
-        if r:left() > 0 then r:byte("detectors") end
     end,
     Status = function(r)
         r:variant("state", State)
@@ -260,9 +258,6 @@ local messages = {
         return string.format("%s %d: %s", refused and "refusal" or "answer", id, outcome)
     end,
     Frame = frame,
-    Channel = function(r)
-        return string.format("detector %d, %s", r:byte("detector"), frame(r))
-    end,
     Raw = function(r)
         local first = r:number("first_clock")
         r:number("total")

@@ -1,5 +1,5 @@
 //! `nirspi reconstruct --index all`: every measurement of a file or frame of a recording, as a
-//! video.
+//! video; and what many files give, as one stack.
 
 use super::{Args, print, spinning};
 use crate::Usage;
@@ -9,10 +9,14 @@ use crate::report::{StageTimes, stages};
 use anyhow::{Context, Result, bail};
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
-use nirspi::imaging::{FrameReport as Enhanced, MethodReport, enhance_frames};
+use nirspi::imaging::{
+    Enhance, FrameReport as Enhanced, FramesError, MethodReport, enhance_frames_by,
+};
 use nirspi::picture::{Pictures, Unit};
-use nirspi::reconstruct::{check_finite, not_read_words};
-use nirspi::source::{FirstPatterns, Index, OutlierReport};
+use nirspi::provenance::Provenance;
+use nirspi::reconstruct::{Skipped, check_finite, losses};
+use nirspi::source::{FirstPatterns, OutlierReport};
+use nirspi_nets::Device;
 use nirspi_recon::reconstruct::{Method, Reconstruct, Reconstruction, Setting, Stacked};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Measurements, Rows};
@@ -21,28 +25,53 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 #[derive(Debug, Serialize)]
-struct Report {
+pub struct Report {
     input: PathBuf,
-    n: usize,
-    order: String,
+    pub n: usize,
+    pub order: String,
     warm_start: bool,
-    frames: Vec<FrameReport>,
-    pictures: Pictures,
+    pub frames: Vec<FrameReport>,
+    /// Files without an image.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub skipped: Vec<Skipped>,
+    pub pictures: Pictures,
     stage_ms: StageTimes,
 }
 
 #[derive(Debug, Serialize)]
-struct FrameReport {
-    used: usize,
-    /// Whether the frame started from the previous one.
-    warm: bool,
-    #[serde(flatten)]
-    method: MethodReport,
+pub struct FrameReport {
+    /// The file, if there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
-    enhancement: Option<Enhanced>,
-    outliers: Vec<OutlierReport>,
-    warnings: Vec<String>,
-    notes: Vec<String>,
+    pub file: Option<PathBuf>,
+    /// Number of the measurement in this file, if it has several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub index: Option<usize>,
+    pub used: usize,
+    /// Whether the frame started from the previous one.
+    pub warm: bool,
+    #[serde(flatten)]
+    pub method: MethodReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub enhancement: Option<Enhanced>,
+    pub outliers: Vec<OutlierReport>,
+    pub warnings: Vec<String>,
+    pub notes: Vec<String>,
+}
+
+/// A stack that was made.
+pub struct Made {
+    /// What was named, for the pictures.
+    pub named: String,
+    pub images: Vec<Image>,
+    /// Lengths of the stretches of images that have one white level.
+    pub stretches: Vec<usize>,
+    /// The images with the readings as they are, for networks, and the patterns of each.
+    pub given: Vec<(Image, Rows)>,
+    pub unit: Unit,
+    pub provenance: Provenance,
+    pub order: String,
+    pub frames: Vec<FrameReport>,
+    pub skipped: Vec<Skipped>,
 }
 
 pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
@@ -77,10 +106,9 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     }
     let others = times.time("reconstruct", || spinning(|| solve_all(args, &imaginary)))?;
     let mut others = others.into_iter();
-    let (mut images, mut frames) = (Vec::new(), Vec::new());
-    let mut given = Vec::new();
     let unit = Unit::of_readings(sources[0].frames.is_some());
     let provenance = sources[0].taken.made(made());
+    let (mut images, mut given, mut frames) = (Vec::new(), Vec::new(), Vec::new());
     for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
         let warm = made.report.warm;
         let Solved { mut image, with_readings, report } = args.method.solved(made, used);
@@ -88,36 +116,36 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
             image = Image::magnitude(&image, &other.image);
         }
         check_finite(&args.source.input, &image)?;
-        let image = source.flattened(image);
-        given.push(source.flattened(with_readings));
-        let dropped = |d: &nirspi_recon::Dropout| {
-            format!("drop-out: {} from y[{}] on", count_of(d.length, "reading"), d.start)
-        };
-        let mut notes: Vec<String> = source.dropouts.iter().map(dropped).collect();
-        if !source.not_read.is_empty() {
-            notes.push(not_read_words(&source.not_read));
-        }
-        let outliers: Vec<_> = source.outliers.iter().map(OutlierReport::of).collect();
-        let warnings = source.warnings;
-        notes.extend(source.notes);
-        let used = used.rows().len();
+        images.push(source.flattened(image));
+        given.push((source.flattened(with_readings), used.rows().clone()));
         frames.push(FrameReport {
-            used,
+            file: None,
+            index: None,
+            used: used.rows().len(),
             warm,
             method: report,
             enhancement: None,
-            outliers,
-            warnings,
-            notes,
+            outliers: source.outliers.iter().map(OutlierReport::of).collect(),
+            notes: losses(&source).chain(source.notes.iter().cloned()).collect(),
+            warnings: source.warnings,
         });
-        images.push(image);
     }
+    let order = orders.into_iter().next().unwrap_or_default();
+    let (stretches, skipped) = (vec![images.len()], Vec::new());
+    let named = named();
+    let made = Made { named, images, stretches, given, unit, provenance, order, frames, skipped };
+    let (report, provenance) = write(args, made, times)?;
+    args.report.print(&report, &provenance, |report| say(args, report))
+}
+
+/// Enhances the stack if that is asked for, and writes it with its pictures and its report.
+pub fn write(args: &Args, made: Made, mut times: StageTimes) -> Result<(Report, Provenance)> {
+    let Made { named, images, stretches, given, unit, provenance, order, mut frames, skipped } =
+        made;
     let mut sharp = None;
     if args.enhance {
-        let made: Vec<(&Image, &Rows)> =
-            given.iter().zip(&used).map(|(image, used)| (image, used.rows())).collect();
         let (pixels, reports) =
-            spinning(|| enhance_frames(&made, &mut times)).context("--enhance")?;
+            spinning(|| enhanced(&given, &stretches, &mut times)).context("--enhance")?;
         for (frame, report) in frames.iter_mut().zip(reports) {
             frame.enhancement = Some(report);
         }
@@ -127,13 +155,14 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let short = |at: &usize| frames[*at].enhancement.as_ref().is_some_and(|e| !e.short.is_empty());
     let warned = (0..frames.len()).filter(short).collect();
     let sharp_and_warned = sharp.as_deref().map(|sharp| (sharp, warned));
-    let pictures = Pictures::of_video(&named(), &images, unit, sharp_and_warned, &provenance);
+    let pictures = Pictures::of_video(&named, &images, unit, sharp_and_warned, &provenance);
     let report = Report {
         input: args.source.input.clone(),
         n,
-        order: orders.into_iter().next().unwrap_or_default(),
+        order,
         warm_start: args.warm_start,
         frames,
+        skipped,
         pictures,
         stage_ms: times,
     };
@@ -147,7 +176,26 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     report.pictures.write(&mut out)?;
     out.write("report.json", provenance.sign(&report)?.as_bytes())?;
     out.commit()?;
-    args.report.print(&report, &provenance, |report| say(args, report))
+    Ok((report, provenance))
+}
+
+/// The enhanced pixels of all images, and a report of each.
+fn enhanced(
+    given: &[(Image, Rows)],
+    stretches: &[usize],
+    times: &mut StageTimes,
+) -> Result<(Vec<f32>, Vec<Enhanced>), FramesError> {
+    let networks = Enhance::built_in(&Device::cpu())?;
+    let given: Vec<(&Image, &Rows)> = given.iter().map(|(image, rows)| (image, rows)).collect();
+    let (mut rest, mut pixels, mut reports) = (&given[..], Vec::new(), Vec::new());
+    for &length in stretches {
+        let (stretch, after) = rest.split_at(length);
+        let (mut made, mut told) = enhance_frames_by(&networks, stretch, times)?;
+        pixels.append(&mut made);
+        reports.append(&mut told);
+        rest = after;
+    }
+    Ok((pixels, reports))
 }
 
 /// The image of each frame.
@@ -162,7 +210,7 @@ fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> 
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     let warm = report.frames.iter().filter(|frame| frame.warm).count();
-    let what = if args.source.detector == Some(Index::All) { "detector" } else { "frame" };
+    let what = "frame";
     print::line(format_args!(
         "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.3} ms a {what}",
         report.input.display(),

@@ -115,7 +115,6 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["capture", "--camera", "replay:r.mcap", "--light", "20ms"], &["--light", "--frames"]),
         (&["serve", "--light", "20ms", "--sum", "9"], &["--light", "--sum"]),
         (&["serve", "--light", "2s"], &["--light 2s", "at most 1024", "--sweeps"]),
-        (&["dataset", "--light", "20"], &["--light", "20ms or 20s"]),
         (&["eval", "table3", "--light", "1s", "--frames", "9"], &["--light", "--frames"]),
         (&["calibrate", "--white", "--light", "0.1ms"], &["--light 0.1ms", "1 sweeps", "8 to"]),
         (&["demo", "--blanked", "5"], &["--blanked is 5", "--clocks-per-pattern"]),

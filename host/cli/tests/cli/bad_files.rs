@@ -146,7 +146,6 @@ fn crafted(bench: &Bench, name: &str, setup: &MeasurementSetup, settling: &Settl
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Vec::new(),
-        detectors: 1,
     };
     let target = Target::New(bench.path(name));
     let mut recorder =

@@ -48,9 +48,8 @@ fn no_calibration_needs_a_latency() {
     assert!(bench.names().is_empty());
 }
 
-/// Bright LEDs that differ by a tenth, one of them dead, and a second detector.
-const UNEQUAL: &[u8] = b"[leds]\npower_mw = 40\npower_spread = 0.1\ndead = [[3, 7]]\n\
-    [detector]\nfurther_mm = [[100, 0]]\n";
+/// Bright LEDs that differ by a tenth, one of them dead.
+const UNEQUAL: &[u8] = b"[leds]\npower_mw = 40\npower_spread = 0.1\ndead = [[3, 7]]\n";
 
 #[test]
 fn a_flat_field_is_kept_for_its_camera_and_applied_to_its_pictures() {
@@ -84,12 +83,7 @@ fn a_flat_field_is_kept_for_its_camera_and_applied_to_its_pictures() {
         bench.json(&format!("{out}/report.json"))["notes"].to_string()
     };
     let again = reconstruct(&[], "again");
-    assert!(
-        again.contains("flat field of") && !again.contains("measured at detector 0"),
-        "{again}"
-    );
-    let second = reconstruct(&["--detector", "1"], "second");
-    assert!(second.contains("the flat field was measured at detector 0"), "{second}");
+    assert!(again.contains("flat field of"), "{again}");
     assert!(!reconstruct(&["--no-flat-field"], "as-it-is").contains("flat field"));
     let pixels = |out: &str| std::fs::read(bench.path(&format!("{out}/image.npy"))).unwrap();
     assert_eq!(pixels("seen"), pixels("again"));

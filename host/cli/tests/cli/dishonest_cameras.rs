@@ -202,7 +202,6 @@ const IDENTITY: Identity<'static> = Identity {
     adc_bits: 14,
     wavelength_nm: 1550,
     capabilities: Tail(None),
-    detectors: Tail(None),
 };
 
 /// Captures 50 frames of it into `rec.mcap`.

@@ -71,7 +71,6 @@ fn a_camera_of_a_future_protocol_is_told_apart_with_both_versions() {
             adc_bits: 16,
             wavelength_nm: 1550,
             capabilities: Tail(None),
-            detectors: Tail(None),
         }))
     };
     let words = ["protocol version 99", "versions 1 to 4", "update this program"];

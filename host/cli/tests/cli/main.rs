@@ -5,7 +5,6 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests are tests
 
-mod archive;
 mod arguments;
 mod bad_files;
 mod bench;
@@ -19,6 +18,7 @@ mod doors;
 mod enhance;
 mod everyday;
 mod foreign_devices;
+mod many;
 mod metrics;
 mod other_forms;
 mod packaging;
@@ -42,7 +42,6 @@ mod serve_controls;
 mod serve_guarded;
 mod settings;
 mod sparse_problems;
-mod sync;
 mod train;
 mod update;
 mod versions;

@@ -1,7 +1,7 @@
 //! Every shell command of the README, the book and the boards' pages runs as it stands, from a folder that holds nothing,
 //! or is in a list that says why it does not run here.
 
-use crate::bench::{Bench, correlation};
+use crate::bench::Bench;
 use std::fs;
 use std::path::Path;
 
@@ -36,14 +36,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/bring-up.md", "nirspi devices", "opens every serial port of this machine"),
     ("docs/browser.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
     ("docs/browser.md", "http.server", "runs until it is stopped; .ci/run web"),
-    ("docs/clusters.md", "reconstruct archive/", "the user's archive; tests/cli/archive.rs"),
-    (
-        "docs/clusters.md",
-        "nirspi dataset",
-        "8 s of a processor; tests/cli/archive.rs writes a smaller set",
-    ),
-    ("docs/clusters.md", "export AWS", "an account of the user; .ci/run stores"),
-    ("docs/clusters.md", "s3://", "needs an object store; .ci/run stores"),
+    ("docs/clusters.md", "reconstruct archive/", "the user's archive; tests/cli/many.rs"),
     ("docs/clusters.md", "ray start", "needs Ray; .ci/run cluster"),
     ("docs/live-page.md", "curl", "needs the page of another terminal; tests/cli/serve.rs"),
     ("docs/mutants.md", "cargo mutants", "hours; .ci/run mutants"),
@@ -53,16 +46,8 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/quality.md", "eval table", "minutes; tests/cli/rain.rs has fewer scenes"),
     ("docs/quality.md", "metrics sharp.npy", "the user's stacks; tests/cli/metrics.rs"),
     ("docs/reliability.md", "serve_soak.py", "ten minutes; .ci/run crowd"),
-    (
-        "docs/several-cameras.md",
-        "sync left.mcap",
-        "needs two recordings at the same time; tests/cli/sync.rs",
-    ),
-    ("docs/several-cameras.md", "--camera zenoh:", "needs the feature zenoh; .ci/run zenoh"),
-    ("docs/several-cameras.md", "/opt/ros", "needs ROS 2"),
-    ("docs/several-cameras.md", "nirspi.ros2", "needs ROS 2"),
-    ("docs/several-cameras.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
-    ("docs/several-cameras.md", "benches/", "the user's archive; tests/cli/archive.rs"),
+    ("docs/measurements.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
+    ("docs/measurements.md", "benches/", "the user's archive; tests/cli/many.rs"),
     ("docs/training.md", "python ", "needs torch and data of other groups"),
     (
         "docs/training.md",
@@ -79,13 +64,8 @@ const BEFORE: &[(&str, &str)] = &[
 ];
 
 /// Pages with a test of their own, because their commands take seconds.
-const ALONE: [&str; 5] = [
-    "README.md",
-    "docs/first-picture.md",
-    "docs/measurements.md",
-    "docs/how-it-works.md",
-    "docs/several-cameras.md",
-];
+const ALONE: [&str; 4] =
+    ["README.md", "docs/first-picture.md", "docs/measurements.md", "docs/how-it-works.md"];
 
 fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
@@ -199,26 +179,4 @@ fn every_reason_for_not_running_a_command_has_its_command() {
         let there = on.any(|(_, commands)| commands.iter().any(|line| line.contains(part)));
         assert!(there, "`{part}` ({why}) is in no command of {of:?}: remove it from NOT_RUN");
     }
-}
-
-#[test]
-fn every_line_about_several_detectors_runs_as_it_stands() {
-    const PAGE: &str = "docs/several-cameras.md";
-    let page = text(PAGE);
-    let (_, section) = page.split_once("## Several detectors").unwrap();
-    let (_, description) = section.split_once("```toml\n").unwrap();
-    let bench = Bench::new();
-    bench.write("three.toml", description.split("```").next().unwrap().as_bytes());
-    let ran = runs_as_it_stands(&bench, PAGE);
-    assert_eq!(ran.len(), 6, "{ran:?}");
-    for said in [&ran[0], &ran[1]] {
-        assert!(said.contains("detector 2: 100 received, 0 lost"), "{said}");
-    }
-    assert!(ran[2].contains("3 detectors of 32 x 32"), "{}", ran[2]);
-    assert!(ran[3].contains("100 frames of 32 x 32"), "{}", ran[3]);
-    // The sum of each detector's frames, from the recording and from its arrays.
-    assert_eq!(bench.pixels("three/image.npy").len(), 3 * 1024);
-    let same = correlation(&bench.pixels("three/image.npy"), &bench.pixels("same/image.npy"));
-    // Arrays of several detectors do not say their noise.
-    assert!(same > 0.98, "{same}");
 }

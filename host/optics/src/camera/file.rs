@@ -3,7 +3,7 @@
 //!
 //! The paper's description has every key and thereby defines all keys and their kinds.
 
-use super::{CameraModel, MOST_FURTHER_DETECTORS, SHIPPED};
+use super::{CameraModel, SHIPPED};
 use crate::SIDE;
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
 use crate::lamp::LightSource;
@@ -57,11 +57,6 @@ pub(super) const RANGES: &[(&str, f64, f64)] = &[
     ("tof.offset_y_mm", -1000.0, 1000.0),
     ("tof.noise_mm", 0.0, 1000.0),
 ];
-
-/// The key of the further detectors' positions.
-const FURTHER: &str = "detector.further_mm";
-/// The farthest position of a detector along each axis.
-const FARTHEST_MM: f64 = 1000.0;
 
 /// Why a text is not a camera description. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -221,9 +216,6 @@ fn check_value(key: &str, found: &Value) -> Result<(), CameraModelError> {
             Err(AirError::Numbers(error)) => return Err(value(key, found, error.expected)),
             Err(error) => return Err(value(key, found, format!("possible weather ({error})"))),
         },
-        (FURTHER, ..) => found
-            .as_array()
-            .is_some_and(|all| all.len() <= MOST_FURTHER_DETECTORS && all.iter().all(is_position)),
         ("leds.dead", ..) => found.as_array().is_some_and(|leds| leds.iter().all(is_place)),
         _ => true,
     };
@@ -232,9 +224,6 @@ fn check_value(key: &str, found: &Value) -> Result<(), CameraModelError> {
     }
     let expected = match key {
         "leds.dead" => format!("a list of [row, column], each 0 to {}", SIDE - 1),
-        FURTHER => format!(
-            "a list of at most {MOST_FURTHER_DETECTORS} positions [x, y], each from -{FARTHEST_MM} to {FARTHEST_MM}"
-        ),
         _ => kind(key, found),
     };
     Err(value(key, found, expected))
@@ -244,15 +233,6 @@ fn check_value(key: &str, found: &Value) -> Result<(), CameraModelError> {
 fn is_place(led: &Value) -> bool {
     let inside = |at: &Value| at.as_integer().is_some_and(|at| (0..SIDE as i64).contains(&at));
     led.as_array().is_some_and(|place| place.len() == 2 && place.iter().all(inside))
-}
-
-/// Whether the value is the position of a detector.
-fn is_position(value: &Value) -> bool {
-    let near = |at: &Value| {
-        let at = at.as_float().or_else(|| at.as_integer().map(|whole| whole as f64));
-        at.is_some_and(|at| at.abs() <= FARTHEST_MM)
-    };
-    value.as_array().is_some_and(|place| place.len() == 2 && place.iter().all(near))
 }
 
 /// Checks conditions on two values.

@@ -96,7 +96,7 @@ pub struct Collector {
 }
 
 /// The photodiode.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Detector {
     /// Diameter of the active area.
@@ -109,14 +109,7 @@ pub struct Detector {
     pub capacitance_pf: f64,
     /// Dark current at its working voltage.
     pub dark_current_na: f64,
-    /// Positions of further detectors of the same type, each with a collector, an amplifier and an ADC of its
-    /// own: to the right of the projector's axis and below it, seen from the camera. At most
-    /// [`MOST_FURTHER_DETECTORS`].
-    pub further_mm: Vec<[f64; 2]>,
 }
-
-/// The most detectors beside the first one.
-pub const MOST_FURTHER_DETECTORS: usize = 7;
 
 /// The transimpedance amplifier: one pole.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -245,12 +238,6 @@ impl CameraModel {
     #[must_use]
     pub fn digest(&self) -> u32 {
         fnv1a(canonical(self).as_bytes())
-    }
-
-    /// Number of detectors.
-    #[must_use]
-    pub fn detectors(&self) -> usize {
-        1 + self.detector.further_mm.len()
     }
 
     /// Checks all ranges, for a description that was changed after reading.

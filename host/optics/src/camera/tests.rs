@@ -174,37 +174,6 @@ fn a_larger_diode_makes_the_amplifier_noisier() {
 }
 
 #[test]
-fn a_detector_to_the_right_sees_the_right_side_brighter() {
-    let camera = CameraModel::parse("[detector]\nfurther_mm = [[0, 0], [300, 0.0]]").unwrap();
-    assert_eq!(camera.detectors(), 3);
-    assert_eq!(camera.detector_gains(0, 300.0), None);
-    assert!(camera.detector_gains(1, 300.0).unwrap().iter().all(|&gain| gain == 1.0));
-    let gains = camera.detector_gains(2, 300.0).unwrap();
-    // By hand: LED 16 of row 16 is 0.75 mm off the axis along x and y in a field of 48 mm, 300 mm away.
-    let (on_axis, beside) = (300.0_f64.powi(2) + 2.0 * 0.75_f64.powi(2), 299.25_f64.powi(2));
-    let expected = (on_axis / (beside + 0.75_f64.powi(2) + 300.0_f64.powi(2))).powi(2);
-    assert!((f64::from(gains[16 * 32 + 16]) - expected).abs() < 1e-6, "{expected}");
-    for row in gains.chunks_exact(32) {
-        assert!(row.is_sorted() && row[31] > 1.1 * row[0]);
-    }
-    assert_eq!(camera.detector_gains(3, 300.0), None);
-    let read_again = CameraModel::parse(&camera.to_toml()).unwrap();
-    assert_eq!(read_again, camera);
-}
-
-#[test]
-fn positions_of_detectors_are_checked() {
-    for further in ["[[0, 0, 0]]", "[[0, 1001]]", "[[nan, 0]]", "[1, 2]", "[[\"a\", 1]]"] {
-        let error = CameraModel::parse(&format!("[detector]\nfurther_mm = {further}"));
-        let error = error.unwrap_err().to_string();
-        assert!(error.starts_with("detector.further_mm is"), "{error}");
-        assert!(error.ends_with("at most 7 positions [x, y], each from -1000 to 1000"), "{error}");
-    }
-    let eight = format!("[detector]\nfurther_mm = [{}]", "[0, 1], ".repeat(8));
-    assert!(CameraModel::parse(&eight).is_err());
-}
-
-#[test]
 fn a_key_depends_on_names_and_values_alone() {
     #[derive(Serialize)]
     struct Inner {

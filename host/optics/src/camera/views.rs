@@ -139,21 +139,4 @@ impl CameraModel {
         };
         (0..LEDS).map(gain).collect()
     }
-
-    /// Light of each LED at a further detector (1, 2, ...), divided by that at a detector on the
-    /// projector's axis: 32 x 32, row-major. The target is flat, diffuse and square to the axis, and
-    /// every detector looks along the axis, so light goes with `1 / r^4`: twice the cosine, and the
-    /// square of the distance r from LED's spot to detector. `None` if there is no such detector.
-    #[must_use]
-    pub fn detector_gains(&self, detector: usize, distance_mm: f64) -> Option<Vec<f32>> {
-        let [x_mm, y_mm] = *self.detector.further_mm.get(detector.checked_sub(1)?)?;
-        let pitch_mm = self.projector.field_mm(distance_mm) / SIDE as f64;
-        let centre = (SIDE - 1) as f64 / 2.0;
-        let square_mm2 = |x: f64, y: f64| x * x + y * y + distance_mm * distance_mm;
-        let gain = |at: usize| {
-            let [x, y] = [at % SIDE, at / SIDE].map(|place| (place as f64 - centre) * pitch_mm);
-            (square_mm2(x, y) / square_mm2(x - x_mm, y - y_mm)).powi(2) as f32
-        };
-        Some((0..LEDS).map(gain).collect())
-    }
 }

@@ -19,7 +19,6 @@ from importlib.metadata import PackageNotFoundError, version
 
 from . import metrics, omp, rain
 from ._nirspi import Error, devices
-from .archive import Archive, Report, Sweep
 from .camera import Account, Camera, Frame
 from .camera_model import CameraModel
 from .hadamard import Hadamard, order, orders, patterns
@@ -36,7 +35,6 @@ except PackageNotFoundError:  # a source tree that is not installed
 
 __all__ = [
     "Account",
-    "Archive",
     "Camera",
     "CameraModel",
     "Error",
@@ -45,8 +43,6 @@ __all__ = [
     "Image",
     "Measurement",
     "Recording",
-    "Report",
-    "Sweep",
     "bases",
     "deblur",
     "deblur_models",

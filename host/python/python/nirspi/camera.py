@@ -255,11 +255,6 @@ class Camera:
         return json.loads(self._camera.identity)
 
     @property
-    def detectors(self) -> int:
-        """Number of detectors. Frames are those of detector 0; a recording has those of every detector."""
-        return int(self.identity["detectors"])
-
-    @property
     def setup(self) -> dict[str, Any]:
         """The measurement: order, rows, timing."""
         return json.loads(self._camera.setup)
@@ -268,6 +263,13 @@ class Camera:
     def rows(self) -> np.ndarray:
         """Natural-order Hadamard rows in the order shown, (M,)."""
         return np.asarray(self.setup["rows"], np.int64)
+
+    @property
+    def truth(self) -> np.ndarray | None:
+        """What a perfect camera of 32 x 32 pixels would see of a virtual camera's scene, (32, 32) in
+        [0, 1]; None for any other camera."""
+        truth = self._camera.truth
+        return None if truth is None else truth.reshape(32, 32)
 
     @property
     def status(self) -> dict[str, Any]:

@@ -225,7 +225,6 @@ def _numbers(values: Any, name: str) -> np.ndarray:
 def source_options(
     *,
     index: int | str | None = None,
-    detector: int | str | None = None,
     shown: str | None = None,
     side: int | None = None,
     field: str | None = None,
@@ -240,7 +239,6 @@ def source_options(
     """The options of :func:`load` as the compiled part takes them."""
     return {
         "index": None if index is None else str(index),
-        "detector": None if detector is None else str(detector),
         "shown": shown,
         "side": None if side is None else _arrays.side(side),
         "field": field,
@@ -258,7 +256,6 @@ def load(
     path: str | os.PathLike[str],
     *,
     index: int | str | None = None,
-    detector: int | str | None = None,
     shown: str | None = None,
     side: int | None = None,
     field: str | None = None,
@@ -281,9 +278,6 @@ def load(
     index : int, "all" or None
         Which of several measurements. With "all", each measurement of a file, or each frame of a
         recording; without, the frames of a recording are summed.
-    detector : int, "all" or None
-        Which detector of a recorded camera that has several. With "all", ``d`` is (detectors, M);
-        without, it is detector 0.
     shown : str, optional
         The order in which patterns were shown, for a file without ``h_row``.
     side : int, optional
@@ -327,7 +321,6 @@ def load(
     """
     options = source_options(
         index=index,
-        detector=detector,
         shown=shown,
         side=side,
         field=field,

@@ -112,15 +112,10 @@ class Recording:
         """Flags of each frame, see :class:`Frame`, (F,)."""
         return self._frames["flags"]
 
-    @property
-    def detectors(self) -> int:
-        """Number of detectors of the recorded camera. The frames above are those of detector 0."""
-        return int(self.identity["detectors"])
-
     def measurement(self, **options: Any) -> Measurement:
         """The measurement of all frames together: :func:`nirspi.load` of this file.
 
-        ``index="all"`` gives one measurement a frame, ``detector="all"`` one a detector.
+        ``index="all"`` gives one measurement a frame.
         """
         return load(self.path, **options)
 
@@ -181,19 +176,3 @@ class Recording:
         }
         table = pa.table(columns).replace_schema_metadata(facts)
         pq.write_table(table, os.fspath(path), **{"compression": "zstd", **options})
-
-    def to_zarr(self, path: str | os.PathLike[str], *, keep_leak: bool = False) -> None:
-        """Writes the frames as a Zarr store (version 3), a folder that ``zarr.open_group`` and
-        ``xarray.open_zarr`` open: the arrays of ``nirspi export --to zarr``.
-
-        Arrays: ``frames`` (F, M), each reading less that of its complement, in ADC counts; ``d``, their
-        mean; ``h_row``, ``sequence``, ``device_time_us`` and ``time``. A folder of that name is replaced
-        if it is such a store.
-
-        Parameters
-        ----------
-        path : path
-        keep_leak : bool
-            Whether to leave the leak from pattern to pattern uncorrected.
-        """
-        _nirspi.export_zarr(self.path, os.fspath(path), bool(keep_leak))

@@ -2,7 +2,6 @@
 
 import os
 import pathlib
-import re
 import subprocess
 import sys
 import sysconfig
@@ -14,11 +13,8 @@ import pytest
 
 import nirspi as ns
 import nirspi.ray
-from conftest import ROOT
 
 pytest.importorskip("ray")
-pytest.importorskip("dask.distributed")
-pq = pytest.importorskip("pyarrow.parquet")
 
 from nodes import alive, stop, two_nodes  # noqa: E402 - it needs Ray
 
@@ -44,7 +40,7 @@ def bare(tmp_path_factory):
             if not entry.name.startswith("nirspi") and not (there / entry.name).exists():
                 (there / entry.name).symlink_to(entry.path)
     clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    asked = [str(python), "-c", "import ray.data, dask.distributed, numpy, pyarrow; import nirspi"]
+    asked = [str(python), "-c", "import ray.data, numpy, pyarrow; import nirspi"]
     told = subprocess.run(asked, env=clean, cwd=place, capture_output=True, text=True).stderr.strip()
     if not told.endswith("No module named 'nirspi'"):
         pytest.skip(f"no second environment with Ray and without nirspi can be made here: {told[-300:]}")
@@ -52,12 +48,16 @@ def bare(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory):
+def files(tmp_path_factory):
     place = tmp_path_factory.mktemp("archive")
     random = np.random.default_rng(20261123)
     for k in range(24):
         ns.Measurement(d=random.normal(size=256), rows="zig-zag", n=16).save(place / f"{k:03}.npz")
-    return place
+    return sorted(place.glob("*.npz"))
+
+
+def image(path):
+    return np.asarray(ns.reconstruct(ns.load(path), method="hadamard"))
 
 
 def told_by(work):
@@ -77,56 +77,25 @@ def told_by(work):
     return found[0]
 
 
-def test_a_node_without_the_package_is_named_before_anything_is_written(bare, archive, tmp_path):
-    work = ns.Archive(archive, method="hadamard")
-    work.run(tmp_path / "alone.parquet")
+def test_a_node_without_the_package_is_named_before_anything_is_made(bare, files, tmp_path):
+    def noted(path):
+        (tmp_path / f"{path.name}.begun").touch()
+        return image(path)
+
     with two_nodes(tmp_path, second=bare) as second:
-        error = told_by(lambda: nirspi.ray.run(work, tmp_path / "parts", workers=2, items=4))
+        error = told_by(lambda: list(nirspi.ray.map(noted, files, workers=2, batch=4)))
         assert isinstance(error, ns.Error), error
         text = str(error)
         assert f"{bare} has no nirspi (ModuleNotFoundError: No module named 'nirspi')" in text, text
         assert text.endswith(f"expected {ns.__version__}: install the same package on every node"), text
         # The node that has the package is not named, and the text is one line.
         assert text.count("node ") == 1 and sys.executable not in text and "\n" not in text, text
-        assert not (tmp_path / "parts").exists()
+        assert not list(tmp_path.glob("*.begun"))
 
         stop(second)
         for _ in range(LONGEST_S):
             if len(alive()) == 1:
                 break
             threading.Event().wait(1)
-        report = told_by(lambda: nirspi.ray.run(work, tmp_path / "parts", workers=1, items=4))
-    assert report.rows == 24, report
-    parts = sorted((tmp_path / "parts").glob("part-*.parquet"))
-    rows = [row for part in parts for row in pq.read_table(part).to_pylist()]
-    assert rows == pq.read_table(tmp_path / "alone.parquet").to_pylist()
-
-
-def test_the_recipe_for_dask_names_a_worker_without_the_package(bare, archive, tmp_path, monkeypatch):
-    import dask.distributed
-
-    monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/clusters.md").read_text(), re.S)
-    (recipe,) = (block for block in blocks if "dask.distributed" in block)
-    client = dask.distributed.Client
-    one = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
-    with dask.distributed.LocalCluster(**one) as cluster:
-        words = [cluster.scheduler_address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
-        program = [str(bare), "-m", "distributed.cli.dask_worker", *words]
-        clean = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-        worker = subprocess.Popen(program, env=clean, cwd=tmp_path)
-        try:
-            with client(cluster.scheduler_address) as waiting:
-                waiting.wait_for_workers(2, timeout=LONGEST_S)
-            monkeypatch.setattr(
-                dask.distributed, "Client", lambda **_words: client(cluster.scheduler_address)
-            )
-            names = {"__name__": "__main__", "ns": ns, "archive": ns.Archive(archive, method="hadamard")}
-            error = told_by(lambda: exec(compile(recipe, "docs/clusters.md", "exec"), names))
-        finally:
-            worker.terminate()
-            worker.wait(60)
-    assert isinstance(error, ns.Error), error
-    assert f"expected nirspi {ns.__version__} on every worker" in str(error), error
-    assert str(error).count("tcp://") == 1 and "No module named 'nirspi'" in str(error), error
-    assert not list(tmp_path.glob("dask/part-*"))
+        found = told_by(lambda: list(nirspi.ray.map(noted, files, workers=1, batch=4)))
+    assert [one.value.tobytes() for one in found] == [image(path).tobytes() for path in files]

@@ -1,6 +1,5 @@
-"""Archives and sweeps on a real cluster of two nodes of this machine: two `ray start`."""
+"""Files and seeds on a real cluster of two nodes of this machine: two `ray start`."""
 
-import json
 import os
 import pathlib
 import signal
@@ -13,8 +12,7 @@ import pytest
 import nirspi as ns
 import nirspi.ray
 
-pytest.importorskip("ray")
-pq = pytest.importorskip("pyarrow.parquet")
+ray = pytest.importorskip("ray")
 
 from nodes import two_nodes  # noqa: E402 - it needs Ray
 
@@ -27,7 +25,7 @@ def cluster(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def archive(tmp_path_factory):
+def files(tmp_path_factory):
     """200 measurement files, and three files that hold no measurement."""
     place = tmp_path_factory.mktemp("archive")
     random = np.random.default_rng(20261121)
@@ -36,114 +34,103 @@ def archive(tmp_path_factory):
         ns.Measurement(d=d, rows="zig-zag", n=32).save(place / f"{k:03}.npz")
     for k in (17, 60, 150):
         (place / f"{k:03}.npz").write_bytes(b"PK damaged")
-    return place
+    return sorted(place.glob("*.npz"))
 
 
-def joined(folder):
-    parts = sorted(pathlib.Path(folder).glob("part-*.parquet"))
-    return [row for part in parts for row in pq.read_table(part).to_pylist()]
+def image(path):
+    return np.asarray(ns.reconstruct(ns.load(path), method="omp", sampling="40%"))
+
+
+def alone(path):
+    """What one process makes of a file."""
+    try:
+        return image(path)
+    except ns.Error:
+        return None
+
+
+def same(found, expected):
+    return all(
+        (one.value is None and made is None) or one.value.tobytes() == made.tobytes()
+        for one, made in zip(found, expected, strict=True)
+    )
 
 
 def workers():
-    """The processes of the workers that make parts."""
+    """The processes of the workers that make images."""
     found = []
     for entry in pathlib.Path("/proc").glob("[0-9]*"):
         try:
             words = (entry / "cmdline").read_bytes().replace(b"\0", b" ")
         except OSError:
             continue
-        if b"ray::MapWorker" in words:
+        if b"ray::_work" in words:
             found.append(int(entry.name))
     return found
 
 
-def test_the_cluster_gives_the_rows_of_one_process(cluster, archive, tmp_path):
-    work = ns.Archive(archive, method="tikhonov", sampling="40%")
-    alone = work.run(tmp_path / "alone.parquet")
-    report = nirspi.ray.run(work, tmp_path / "parts", items=16)
-    assert (report.rows, report.files) == (197, 200) == (alone.rows, alone.files)
-    assert report.skipped == alone.skipped and len(report.skipped) == 3
-    assert joined(tmp_path / "parts") == pq.read_table(tmp_path / "alone.parquet").to_pylist()
-    again = nirspi.ray.run(work, tmp_path / "parts", items=16, resume=True)
-    assert (again.rows, again.files_before, again.skipped) == (197, 200, alone.skipped)
-    assert json.loads((tmp_path / "parts/report.json").read_text())["rows"] == 197
+def test_two_nodes_give_what_one_process_gives_in_the_order_of_the_items(cluster, files):
+    def image_and_node(path):
+        return ray.get_runtime_context().get_node_id(), image(path)
+
+    found = list(nirspi.ray.map(image_and_node, files, batch=4))
+    assert [one.item for one in found] == files
+    nodes = {one.value[0] for one in found if one.value}
+    assert len(nodes) == 2, nodes
+    images = [nirspi.ray.Mapped(one.item, one.value and one.value[1]) for one in found]
+    assert same(images, [alone(path) for path in files])
+    failed = [one for one in found if one.error]
+    assert [one.item.name for one in failed] == ["017.npz", "060.npz", "150.npz"]
+    for one in failed:
+        assert one.value is None and one.item.name in one.error and "\n" not in one.error
 
 
-def test_a_killed_worker_loses_nothing_and_changes_nothing(cluster, archive, tmp_path):
-    work = ns.Archive(archive, method="omp", sampling="40%")
-    work.run(tmp_path / "alone.parquet")
+def test_a_killed_worker_loses_nothing_and_changes_nothing(cluster, files):
     killed = []
 
     def kill():
-        # After the first part is there, and long before the last.
         for _ in range(2000):
-            if list((tmp_path / "parts").glob("part-*.parquet")) and workers():
-                killed.append(workers()[0])
-                os.kill(killed[0], signal.SIGKILL)
+            if there := workers():
+                killed.append(there[0])
+                os.kill(there[0], signal.SIGKILL)
                 return
             time.sleep(0.01)
 
+    found = nirspi.ray.map(image, files, batch=4)
+    first = next(found)
+    # After the first batch is there, and long before the last.
     thread = threading.Thread(target=kill)
     thread.start()
-    report = nirspi.ray.run(work, tmp_path / "parts", items=4)
+    found = [first, *found]
     thread.join()
     assert killed, "no worker was there to kill"
-    assert (report.rows, len(report.skipped)) == (197, 3)
-    names = {path.name for path in (tmp_path / "parts").iterdir() if not path.name.startswith(".")}
-    assert names == {f"part-{k:06}.parquet" for k in range(50)} | {"plan.json", "report.json"}
-    assert joined(tmp_path / "parts") == pq.read_table(tmp_path / "alone.parquet").to_pylist()
+    assert [one.item for one in found] == files
+    assert same(found, [alone(path) for path in files])
 
 
-def test_missing_parts_are_made_and_others_are_kept(cluster, archive, tmp_path):
-    work = ns.Archive(archive, method="hadamard")
-    out = tmp_path / "parts"
-    nirspi.ray.run(work, out, items=50)
-    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in out.glob("part-*")}
-    lost = out / "part-000002.parquet"
-    lost.unlink()
-    report = nirspi.ray.run(work, out, items=50, resume=True)
-    assert (report.rows, report.files_before) == (197, 150)
-    for path, (at, content) in before.items():
-        assert path.read_bytes() == content and (path == lost or path.stat().st_mtime_ns == at)
-    with pytest.raises(ns.Error, match="expected resume=True"):
-        nirspi.ray.run(work, out, items=50)
-    with pytest.raises(ns.Error, match="made with other items"):
-        nirspi.ray.run(work, out, items=49, resume=True)
-    with pytest.raises(ns.Error, match="made with other settings"):
-        nirspi.ray.run(ns.Archive(archive, sampling=0.5), out, items=50, resume=True)
-    with pytest.raises(ns.Error, match="made with other names"):
-        nirspi.ray.run(ns.Archive([archive / "000.npz"], method="hadamard"), out, items=50, resume=True)
+def test_seeds_give_the_measurements_of_one_process(cluster):
+    def shot(seed):
+        with ns.Camera("virtual", sampling=0.1, weather="heavy", seed=seed) as camera:
+            return {"d": camera.capture(4).d, "truth": camera.truth}
+
+    found = list(nirspi.ray.map(shot, range(1, 7), batch=2))
+    for one in found:
+        expected = shot(one.item)
+        assert (one.value["d"] == expected["d"]).all() and (one.value["truth"] == expected["truth"]).all()
+    assert not (found[0].value["d"] == found[1].value["d"]).all()
 
 
-def test_a_sweep_gives_the_rows_of_one_process(cluster, tmp_path):
-    sweep = ns.Sweep(
-        weathers=["none", "heavy"], distances_m=[0.3, 0.6], samplings=0.1, seeds=range(3), frames=4
-    )
-    sweep.run(tmp_path / "alone.parquet")
-    report = nirspi.ray.run(sweep, tmp_path / "parts", items=2)
-    assert report.rows == 12
-    assert joined(tmp_path / "parts") == pq.read_table(tmp_path / "alone.parquet").to_pylist()
+def test_failures_of_the_cluster_are_errors_in_one_line(cluster, files, monkeypatch):
+    def typo(path):
+        return path.nowhere
 
-
-def test_a_store_by_its_address(cluster, archive, tmp_path):
-    work = ns.Archive(archive, method="hadamard")
-    report = nirspi.ray.run(work, f"file://{tmp_path}/parts", items=100)
-    assert report.rows == len(joined(tmp_path / "parts")) == 197
-
-
-def test_failures_of_the_cluster_are_errors_in_one_line(cluster, archive, tmp_path, monkeypatch):
-    work = ns.Archive(archive)
+    with pytest.raises(ns.Error, match="the cluster failed: .*nowhere") as error:
+        list(nirspi.ray.map(typo, files[:2]))
+    assert "\n" not in str(error.value)
     monkeypatch.setattr(nirspi.ray, "__version__", "9.9")
     with pytest.raises(ns.Error, match=r"expected 9\.9: install the same package") as error:
-        nirspi.ray.run(work, tmp_path / "other")
-    assert "\n" not in str(error.value) and not (tmp_path / "other").exists()
+        nirspi.ray.map(image, files)
+    assert "\n" not in str(error.value)
     # A worker on a node that came after the nodes were asked.
     with pytest.raises(ns.Error, match=r"nirspi 9\.9 on node .*, expected 8\.8: install the same package"):
-        nirspi.ray._Worker(work, str(tmp_path / "other"), "8.8", False)
-    for wrong, told in [
-        (lambda: nirspi.ray.run("archive/", tmp_path / "x"), "expected nirspi.Archive"),
-        (lambda: nirspi.ray.run(work, tmp_path / "x", items=0), "items is 0"),
-        (lambda: nirspi.ray.run(work, tmp_path / "x", workers=0), "workers is 0"),
-    ]:
-        with pytest.raises(ns.Error, match=told):
-            wrong()
+        nirspi.ray._work(image, files, "8.8")

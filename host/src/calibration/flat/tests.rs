@@ -74,7 +74,6 @@ fn camera(serial: &str) -> CameraIdentity {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Vec::new(),
-        detectors: 1,
     }
 }
 

@@ -463,10 +463,7 @@ impl World {
                     None => return Err("the end of no run".into()),
                 }
             }
-            DeviceMessage::Raw(_)
-            | DeviceMessage::Depth(_)
-            | DeviceMessage::Crash(_)
-            | DeviceMessage::Channel(_) => {}
+            DeviceMessage::Raw(_) | DeviceMessage::Depth(_) | DeviceMessage::Crash(_) => {}
         }
         Ok(())
     }

@@ -13,7 +13,6 @@ mod dissector;
 mod page;
 mod v1;
 mod v2;
-mod v3;
 mod v4;
 mod variants;
 
@@ -34,8 +33,7 @@ fn every_variant_is_frozen() {
     for (request, _) in v1::requests().into_iter().chain(v4::requests()) {
         variants::of_request(&request, &mut seen);
     }
-    let later = v2::device_messages().into_iter().chain(v3::device_messages());
-    let later = later.chain(v4::device_messages());
+    let later = v2::device_messages().into_iter().chain(v4::device_messages());
     for (message, _) in v1::device_messages().into_iter().chain(later) {
         variants::of_device_message(&message, &mut seen);
     }
@@ -50,9 +48,6 @@ fn what_is_new_says_since_which_version() {
         v2::device_messages().iter().map(|(message, _)| message.since()).collect();
     assert_eq!(since, [1, 2, 2, 1, 1], "greeting and status are as old as the protocol");
     let since: Vec<u16> =
-        v3::device_messages().iter().map(|(message, _)| message.since()).collect();
-    assert_eq!(since, [1, 3]);
-    let since: Vec<u16> =
         v4::device_messages().iter().map(|(message, _)| message.since()).collect();
-    assert_eq!(since, [1, 4, 4]);
+    assert_eq!(since, [1, 4]);
 }

@@ -1,6 +1,6 @@
 //! `docs/protocol.md` is written from the definitions of the messages and from their frozen bytes. `NIRSPI_BLESS=1` writes it.
 
-use super::{v1, v2, v3, v4};
+use super::{v1, v2, v4};
 use nirspi_wire::version;
 use std::fmt::Write;
 use std::path::Path;
@@ -178,8 +178,7 @@ fn page() -> String {
     for (request, bytes) in v1::requests().into_iter().chain(v4::requests()) {
         writeln!(page, "{bytes}\n    {request:?}").unwrap();
     }
-    let later = v2::device_messages().into_iter().chain(v3::device_messages());
-    let later = later.chain(v4::device_messages());
+    let later = v2::device_messages().into_iter().chain(v4::device_messages());
     for (message, bytes) in v1::device_messages().into_iter().chain(later) {
         writeln!(page, "{bytes}\n    {message:?}").unwrap();
     }

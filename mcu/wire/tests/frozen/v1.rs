@@ -115,7 +115,6 @@ pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
                     wavelength_nm: 1550,
                     // Version 1 has no capabilities.
                     capabilities: Tail(None),
-                    detectors: Tail(None),
                 })),
             }),
             "00 01 00 00 01 00 01 00 00 01 02 07 76 69 72 74 75 61 6c 02 34 32 20 c0 b2 cd 3b 0e \

@@ -52,7 +52,6 @@ fn greeting(capabilities: Tail<Capabilities>) -> DeviceMessage<'static> {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities,
-        detectors: Tail(None),
     };
     DeviceMessage::Reply(Reply { id: 1, outcome: Ok(Answer::Hello(identity)) })
 }

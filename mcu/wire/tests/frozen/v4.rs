@@ -6,9 +6,8 @@
 use super::bytes::{hex, holds, packet, unhex};
 use nirspi_wire::samples::{MAX_SHIFT, NARROW, Width};
 use nirspi_wire::{
-    Answer, Capabilities, Channel, Command, Configuration, DeviceMessage, Frame, FrameFlags,
-    Identity, PatternOrder, Reply, Request, RunLength, SampleSource, Samples, Tail, Version,
-    encode, open,
+    Answer, Capabilities, Command, Configuration, DeviceMessage, Frame, FrameFlags, Identity,
+    PatternOrder, Reply, Request, RunLength, SampleSource, Samples, Tail, Version, encode, open,
 };
 
 /// The configuration with its tail.
@@ -30,17 +29,10 @@ pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
         samples: narrow(&[1, -1, 0x7F_FFFF, -0x80_0000, 0x01_0203]),
     };
     vec![
-        (greeting(), "00 01 00 00 04 01 02 03 00 01 02 01 62 01 73 20 c0 b2 cd 3b 0e 8e 0c 10 01"),
+        (greeting(), "00 01 00 00 04 01 02 03 00 01 02 01 62 01 73 20 c0 b2 cd 3b 0e 8e 0c 10"),
         (
             DeviceMessage::Frame(frame),
             "01 01 ac 02 28 01 10 80 0f 01 00 00 ff ff ff ff ff 7f 00 00 80 03 02 01",
-        ),
-        (
-            DeviceMessage::Channel(Channel {
-                detector: 2,
-                frame: Frame { samples: narrow(&[-2]), ..frame },
-            }),
-            "06 02 01 ac 02 28 01 10 80 03 fe ff ff",
         ),
     ]
 }
@@ -77,7 +69,6 @@ fn greeting() -> DeviceMessage<'static> {
         adc_bits: 14,
         wavelength_nm: 1550,
         capabilities: Tail(Some(Capabilities::NARROW_SAMPLES)),
-        detectors: Tail(Some(1)),
     };
     DeviceMessage::Reply(Reply { id: 1, outcome: Ok(Answer::Hello(identity)) })
 }

@@ -33,7 +33,7 @@ variants! {
     sample_source: SampleSource { Detector, TestPattern }
     run_length: RunLength { Continuous, Frames }
     reboot_into: RebootInto { Application, Bootloader }
-    device_message: DeviceMessage { Reply, Frame, Raw, Depth, Event, Crash, Channel }
+    device_message: DeviceMessage { Reply, Frame, Raw, Depth, Event, Crash }
     answer: Answer { Hello, Done, Status, SelfTest, Register, Gateware }
     refusal: Refusal {
         Protocol, State, Configuration, Fault, NoSuchRegister, RawLength, GatewareOffset, GatewareCrc,
@@ -88,8 +88,7 @@ pub fn of_device_message(message: &DeviceMessage, seen: &mut Seen) {
         DeviceMessage::Frame(_)
         | DeviceMessage::Raw(_)
         | DeviceMessage::Depth(_)
-        | DeviceMessage::Crash(_)
-        | DeviceMessage::Channel(_) => {}
+        | DeviceMessage::Crash(_) => {}
     }
 }
 

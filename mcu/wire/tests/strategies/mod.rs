@@ -3,8 +3,8 @@
 //! Messages borrow; here they borrow from leaked memory, a few megabytes in a test run.
 
 use nirspi_wire::{
-    Answer, Capabilities, Channel, Command, ConfigField, ConfigProblem, Configuration, CrashReport,
-    Depth, DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
+    Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth,
+    DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
     PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples,
     SelfTestReport, Signal, State, Status, Tail, Version, message::GATEWARE_CHUNK_MAX,
     samples::Words,
@@ -161,15 +161,11 @@ prop_compose! {
     fn identity()(
         firmware in version(), gateware in version(), board in text(), serial in text(),
         (protocol, side, adc_hz, adc_bits, wavelength_nm) in any::<(u16, u8, u32, u8, u16)>(),
-        tails in prop::option::of((any::<u32>(), any::<Option<u8>>())),
+        capabilities in prop::option::of(any::<u32>()),
     ) -> Identity<'static> {
         Identity {
             protocol, firmware, gateware, board, serial, side, adc_hz, adc_bits, wavelength_nm,
-            // A tail has bytes only behind the tails of earlier versions, and in its own version.
-            capabilities: Tail(tails.map(|(capabilities, _)| Capabilities(capabilities))),
-            detectors: Tail(
-                tails.and_then(|(_, detectors)| detectors).filter(|_| protocol >= Channel::SINCE),
-            ),
+            capabilities: Tail(capabilities.map(Capabilities)),
         }
     }
 }
@@ -259,7 +255,5 @@ pub fn device_message() -> impl Strategy<Value = DeviceMessage<'static>> {
             .prop_map(|(device_time_us, kind)| DeviceMessage::Event(Event { device_time_us, kind })),
         1 => (any::<u64>(), text())
             .prop_map(|(uptime_us, text)| DeviceMessage::Crash(CrashReport { uptime_us, text })),
-        3 => (any::<u8>(), frame())
-            .prop_map(|(detector, frame)| DeviceMessage::Channel(Channel { detector, frame })),
     ]
 }

@@ -4,7 +4,6 @@ use crate::{Law, MIB, is_one_line, read, seeds};
 use nirspi::capture::capture;
 use nirspi::info::info;
 use nirspi::link::{Link, Received};
-use nirspi::relay::{Announcement, RelayLink, Subscribe};
 use nirspi::session::Session;
 use nirspi_mcu::{
     BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Micros, NoLoader, PacketSink, PortBus,
@@ -61,15 +60,6 @@ pub const LAWS: &[Law] = &[
             "host/src/tally.rs",
         ],
         holds: session,
-        seeds: || vec![seeds::camera_says()],
-        longest: 4096,
-        most_memory: 16 * MIB,
-    },
-    Law {
-        name: "relay",
-        reads: "packets that another program publishes",
-        readers: &["host/src/relay/link.rs"],
-        holds: relay,
         seeds: || vec![seeds::camera_says()],
         longest: 4096,
         most_memory: 16 * MIB,
@@ -380,22 +370,4 @@ fn talk(link: Box<dyn Link>) {
             assert!(source.measurements.values().iter().all(|value| value.is_finite()));
         }
     }
-}
-
-/// Published packets, one at a time.
-struct Published(VecDeque<Vec<u8>>);
-
-impl Subscribe for Published {
-    fn packet(&mut self, _: Duration) -> io::Result<Option<Vec<u8>>> {
-        let next = self.0.pop_front();
-        next.map(Some).ok_or_else(|| io::Error::other("the other program has gone"))
-    }
-}
-
-fn relay(bytes: &[u8]) {
-    let packets: VecDeque<_> = seeds::packets(bytes).into_iter().map(mended).collect();
-    let announced =
-        Announcement { identity: seeds::identity().clone(), setup: seeds::setup(), settling: None };
-    let link = RelayLink::new(announced, Box::new(Published(packets)));
-    talk(Box::new(link));
 }

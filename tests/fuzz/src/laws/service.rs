@@ -1,4 +1,4 @@
-//! What a page, a script, a viewer or any client sends to the live page's servers.
+//! What a page, a script or any client sends to the live page's servers.
 
 use crate::{Law, MIB, is_one_line, read, seeds};
 use nirspi::serve::fuzzing::{Place, Still, TOKEN};
@@ -31,19 +31,6 @@ pub const LAWS: &[Law] = &[
         holds: http,
         seeds: http_seeds,
         longest: 8192,
-        most_memory: 64 * MIB,
-    },
-    Law {
-        name: "websocket",
-        reads: "what a viewer such as Foxglove sends: the opening, then frames",
-        readers: &[
-            "host/src/serve/foxglove.rs",
-            "host/src/serve/foxglove/messages.rs",
-            "host/src/serve/foxglove/viewer.rs",
-        ],
-        holds: websocket,
-        seeds: websocket_seeds,
-        longest: 2048,
         most_memory: 64 * MIB,
     },
 ];
@@ -184,91 +171,5 @@ fn http_seeds() -> Vec<Vec<u8>> {
         [post("/api/start", ""), ask("HEAD /none", "Connection: close\r\n", "")].concat(),
         ask("POST /api/settings", "Transfer-Encoding: chunked\r\n", "2\r\n{}\r\n0\r\n\r\n"),
         ask("OPTIONS *", "Expect: 100-continue\r\n", ""),
-    ]
-}
-
-/// The opening of a viewer that says everything right.
-const OPENING: &[u8] =
-    b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
-    Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\
-    Sec-WebSocket-Protocol: foxglove.websocket.v1\r\n\r\n";
-
-/// An even first byte: the rest are frames behind a right opening. An odd one: the rest is everything.
-fn websocket(bytes: &[u8]) {
-    let Some((&kind, rest)) = bytes.split_first() else { return };
-    let before = STILL.with_borrow(Still::settings);
-    let asked = if kind & 1 == 0 { [OPENING, rest].concat() } else { rest.to_vec() };
-    let heard = ask(Place::Viewers, &asked);
-    let after = STILL.with_borrow(Still::settings);
-    assert_eq!(before, after, "a viewer changed the settings");
-    let Some((status, head, frames)) = response(&heard) else {
-        assert!(heard.is_empty(), "half an answer");
-        return;
-    };
-    assert!(status != 500, "{head}");
-    if status == 101 {
-        said(frames);
-    } else {
-        assert!(kind & 1 == 1, "a right opening is refused: {head}");
-    }
-}
-
-/// Frames of the server: not masked, whole messages, JSON where they are text.
-fn said(frames: &[u8]) {
-    let (mut rest, mut count, mut is_closed) = (frames, 0, false);
-    while let Some((&[first, length], after)) = rest.split_first_chunk() {
-        assert!(!is_closed, "a message after the end");
-        assert_eq!(first & 0xF0, 0x80, "a message in parts");
-        let (length, after) = match length {
-            126 => {
-                let Some((length, after)) = after.split_first_chunk() else { break };
-                (usize::from(u16::from_be_bytes(*length)), after)
-            }
-            127 => {
-                let Some((length, after)) = after.split_first_chunk() else { break };
-                (u64::from_be_bytes(*length) as usize, after)
-            }
-            length => (usize::from(length), after),
-        };
-        // The connection may end within a message.
-        let Some((body, after)) = after.split_at_checked(length) else { break };
-        match first & 0x0F {
-            1 => {
-                let json: serde_json::Value = serde_json::from_slice(body).expect("JSON");
-                assert!(json["op"].is_string(), "{json}");
-                if let Some(message) = json["message"].as_str() {
-                    is_one_line(message);
-                }
-            }
-            2 => assert_eq!(body.first(), Some(&1), "an operation that is not message data"),
-            8 => is_closed = true,
-            9 | 10 => {}
-            other => panic!("operation {other}"),
-        }
-        (rest, count) = (after, count + 1);
-    }
-    assert!(count < 3000, "{count} messages");
-}
-
-fn websocket_seeds() -> Vec<Vec<u8>> {
-    let frame = |operation: u8, body: &[u8]| {
-        let mask = [0, 0, 0, 0];
-        let length = match body.len() {
-            short @ 0..126 => vec![0x80 | short as u8],
-            long => [&[0x80 | 126][..], &(long as u16).to_be_bytes()].concat(),
-        };
-        [&[0x80 | operation][..], &length, &mask, body].concat()
-    };
-    let text = |json: &str| frame(1, json.as_bytes());
-    let subscribe =
-        r#"{"op":"subscribe","subscriptions":[{"id":7,"channelId":1},{"id":8,"channelId":3}]}"#;
-    vec![
-        [vec![0], text(subscribe), text(r#"{"op":"unsubscribe","subscriptionIds":[7]}"#)].concat(),
-        [vec![0], text(r#"{"op":"setParameters"}"#), frame(9, b"hello"), frame(8, &[3, 232])]
-            .concat(),
-        [vec![0], frame(2, &[1, 2])].concat(),
-        [vec![0], text(r#"{"op":"subscribe"}"#)].concat(),
-        [&[1][..], OPENING].concat(),
-        [&[1][..], b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"].concat(),
     ]
 }

@@ -143,7 +143,7 @@ fn message(payload: &[u8]) {
         if let Some((_, line)) = events::line(&message) {
             is_one_line(&line);
         }
-        if let Some((_, frame)) = message.frame() {
+        if let DeviceMessage::Frame(frame) = message {
             assert_eq!(frame.samples.iter().len(), frame.samples.len());
             assert!(frame.samples.iter().all(|sample| sample.unsigned_abs() < 1 << 50));
         }

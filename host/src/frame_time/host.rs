@@ -1,9 +1,9 @@
-//! The host's clock, the time base of all its cameras.
+//! The host's clock, the time base of its camera.
 
 use crate::clock::{Instant, since_1970};
 
 /// Nanoseconds since 1970 by a clock that does not jump: the system's time of its start, and what
-/// has passed since. All cameras of a program share one.
+/// has passed since.
 #[derive(Debug, Clone, Copy)]
 pub struct HostClock {
     began: Instant,

@@ -19,7 +19,9 @@
 //! (`tests::the_true_clock_is_within_the_uncertainty`). Memory does not grow with time
 //! (`tests::two_days_of_frames_take_the_memory_of_one_window`).
 
-use serde::Serialize;
+mod host;
+
+pub use host::HostClock;
 
 /// The most points that the fit keeps: the earliest arrival of each of as many stretches of time.
 const POINTS: usize = 128;
@@ -35,7 +37,7 @@ const LONGEST_US: u64 = SHORTEST_US << 12;
 /// Length of the window in device time.
 pub const WINDOW_US: u64 = LONGEST_US * POINTS as u64;
 /// The largest drift of an oscillator, as a share. A clock beyond does not run in real time.
-pub(super) const MOST_DRIFT: f64 = 5e-3;
+const MOST_DRIFT: f64 = 5e-3;
 /// Where a device clock of 32 bits starts again.
 const WRAP_US: u64 = 1 << 32;
 /// By how much the time across a wrap may differ from the host's.
@@ -74,7 +76,7 @@ impl Point {
 }
 
 /// The host's time of a camera's clock: a straight line, with its uncertainty.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// The device's time at the middle of the window, with wraps of 32 bits undone.
     pub device_time_us: u64,
@@ -88,17 +90,8 @@ pub struct Fit {
     /// Uncertainty of `host_ns`, without the link's shortest delay; `None` until enough frames have
     /// come.
     pub uncertainty_us: Option<f64>,
-    /// The delay, beyond the link's shortest, that the earliest arrival has in 9 of 12 parts of the
-    /// window.
-    pub delay_us: f64,
-    /// Number of stretches in the fit.
-    pub points: usize,
     /// The host's time that passes in a unit of the device's, less 1.
-    #[serde(skip)]
-    pub(super) slope: f64,
-    /// The same before its limit, and its uncertainty.
-    #[serde(skip)]
-    pub(super) found: Option<(f64, f64)>,
+    slope: f64,
 }
 
 impl Fit {
@@ -123,7 +116,7 @@ impl Fit {
 /// The clock of one camera.
 ///
 /// ```
-/// use nirspi::sync::Clock;
+/// use nirspi::frame_time::Clock;
 ///
 /// let mut clock = Clock::new(500_000.0);                 // frames of 0.5 ms
 /// for n in 0..1000_u64 {
@@ -266,8 +259,8 @@ impl Clock {
         // at its ends. Of 59 743 simulated links with delays of four kinds, the largest error was
         // 0.7 of this; one link of another draw had 0.95, with short delays at one end alone.
         let turn = 5.0 * (excess + 1e3) / (to - from);
-        let found = (count >= ENOUGH).then_some((edge, turn));
-        let known = found.filter(|&(_, turn)| turn <= MOST_DRIFT);
+        let known =
+            (count >= ENOUGH).then_some((edge, turn)).filter(|&(_, turn)| turn <= MOST_DRIFT);
         // Where the drift cannot be known, a clock without drift is the better guess.
         let slope = known.map_or(0.0, |(edge, _)| edge.clamp(-MOST_DRIFT, MOST_DRIFT));
         if slope != edge {
@@ -285,10 +278,7 @@ impl Clock {
             drift_ppm: drift.map(|(ppm, _)| ppm),
             drift_uncertainty_ppm: drift.map(|(_, turn)| turn),
             uncertainty_us: drift.map(|_| 2.0 * excess * 1e-3 + 1.0),
-            delay_us: excess * 1e-3,
-            points: count,
             slope,
-            found,
         }
     }
 

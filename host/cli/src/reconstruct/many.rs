@@ -1,0 +1,119 @@
+//! `nirspi reconstruct FILE FILE ...` and `nirspi reconstruct DIR`: the images of many files, as one
+//! stack.
+
+use super::stack::{FrameReport, Made, Report, write};
+use super::{Args, print};
+use crate::Usage;
+use crate::progress::Progress;
+use crate::provenance::made;
+use crate::report::stages;
+use anyhow::{Result, bail};
+use nirspi::files::folder::measurement_files;
+use nirspi::picture::Unit;
+use nirspi::provenance::Taken;
+use nirspi::reconstruct::{FileImage, ManyImages, many_images};
+use nirspi::source::FirstPatterns;
+use nirspi_recon::words::count_of;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+pub fn run(args: &Args, first: FirstPatterns) -> Result<ExitCode> {
+    if args.warm_start || args.matrix.is_some() {
+        let name = if args.warm_start { "--warm-start" } else { "--matrix" };
+        return Err(Usage(format!("{name} belongs to a single file")).into());
+    }
+    let named: Vec<_> = std::iter::once(&args.source.input).chain(&args.more).cloned().collect();
+    let files = measurement_files(&named)?;
+    let options = args.source.options()?;
+    let solver = args.method.solver(first, args.sampling)?;
+    let mut times = stages();
+    let bar = Progress::of("reconstructing", files.len(), "files");
+    let ManyImages { images, skipped } =
+        times.time("reconstruct", || many_images(&files, &options, &solver, &|| bar.add(1)));
+    drop(bar);
+    if args.enhance && images.iter().any(|image| image.complex) {
+        let needed = "--enhance needs real images: choose --part real or --part imaginary";
+        return Err(Usage(needed.to_owned()).into());
+    }
+    let Some(one) = images.first() else {
+        let reason = skipped.first().map(|skipped| skipped.reason.as_str()).unwrap_or_default();
+        bail!("none of {} gave an image; the first: {reason}", count_of(files.len(), "file"));
+    };
+    let (order, unit) = (one.order.clone(), Unit::of_readings(one.recorded));
+    let provenance = taken(&args.source.input, &images).made(made());
+    // All images of a file have one white level, and files have their own.
+    let stretches: Vec<usize> =
+        images.chunk_by(|a, b| a.file == b.file).map(<[FileImage]>::len).collect();
+    let (mut pictures, mut given, mut frames) = (Vec::new(), Vec::new(), Vec::new());
+    for made in images {
+        pictures.push(made.image);
+        given.push((made.with_readings, made.used));
+        frames.push(FrameReport {
+            file: Some(made.file),
+            index: made.index,
+            used: given.last().map_or(0, |(_, rows)| rows.len()),
+            warm: false,
+            method: made.report,
+            enhancement: None,
+            outliers: made.outliers,
+            warnings: made.warnings,
+            notes: made.notes,
+        });
+    }
+    let named = match &named[..] {
+        [folder] => folder.display().to_string(),
+        all => count_of(all.len(), "name"),
+    };
+    let made = Made {
+        named,
+        images: pictures,
+        stretches,
+        given,
+        unit,
+        provenance,
+        order,
+        frames,
+        skipped,
+    };
+    let (report, provenance) = write(args, made, times)?;
+    let code = args.report.print(&report, &provenance, |report| say(args, &files, report))?;
+    if report.skipped.is_empty() {
+        return Ok(code);
+    }
+    let (count, all) = (report.skipped.len(), count_of(files.len(), "file"));
+    print::complain(format_args!("{}: {count} of {all} gave no image", args.out.display()));
+    Ok(ExitCode::FAILURE)
+}
+
+/// Where the readings come from, as far as all of them have it in common.
+fn taken(named: &Path, images: &[FileImage]) -> Taken {
+    let simulated = images.first().and_then(|image| image.taken.simulated());
+    let all = images.iter().all(|image| image.taken.simulated() == simulated);
+    Taken::of_file(named, simulated.filter(|_| all))
+}
+
+fn say(args: &Args, files: &[PathBuf], report: &Report) -> Result<()> {
+    for skipped in &report.skipped {
+        print::note(format_args!("skipped: {}", skipped.reason))?;
+    }
+    for frame in &report.frames {
+        let file = frame.file.as_deref().unwrap_or(Path::new("")).display();
+        let at = frame.index.map(|index| format!(", {index}")).unwrap_or_default();
+        for outlier in &frame.outliers {
+            print::line(format_args!("{file}{at}: {outlier}"))?;
+        }
+        let enhanced = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
+        for warning in enhanced.chain(&frame.warnings) {
+            print::line(format_args!("warning: {file}{at}: {warning}"))?;
+        }
+    }
+    let (images, n) = (count_of(report.frames.len(), "image"), report.n);
+    let files = count_of(files.len(), "file");
+    print::line(format_args!("{images} of {n} x {n} of {files}, order {}", report.order))?;
+    let enhanced = if args.enhance { ", enhanced.npy" } else { "" };
+    print::line(format_args!(
+        "wrote image.npy{enhanced}, {} and report.json to {}",
+        report.pictures,
+        args.out.display()
+    ))
+}

@@ -1,0 +1,237 @@
+//! The images of many files, by one prepared method on all processors.
+//!
+//! # Invariant
+//! An image is the one that its file alone gives, and images are in the order of the files, whichever
+//! is made first (`tests::images_are_those_of_the_files_alone_in_their_order`). A file that gives no
+//! image is named with the reason and takes no other with it
+//! (`tests::a_file_without_an_image_is_named_and_the_others_are_there`).
+
+use super::{Solved, Solver, SolverError, not_read_words};
+use crate::causes::in_one_line;
+use crate::imaging::MethodReport;
+use crate::provenance::Taken;
+use crate::source::{Index, OutlierReport, Source, SourceError, SourceOptions};
+use nirspi_recon::words::count_of;
+use nirspi_recon::{Image, Rows};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// The image of one measurement of one of many files.
+#[derive(Debug)]
+pub struct FileImage {
+    /// The file.
+    pub file: PathBuf,
+    /// Number of the measurement in a file of several, or of the frame of a recording, from 0.
+    pub index: Option<usize>,
+    /// The image.
+    pub image: Image,
+    /// The same with the readings as they are, for networks.
+    pub with_readings: Image,
+    /// The patterns that were used.
+    pub used: Rows,
+    /// The name of the order that chose them.
+    pub order: String,
+    /// Whether the readings are complex, so that the image is their magnitude.
+    pub complex: bool,
+    /// Whether the readings are those of a recording: ADC counts.
+    pub recorded: bool,
+    /// The method's report.
+    pub report: MethodReport,
+    /// Where the readings come from.
+    pub taken: Taken,
+    /// Readings that light cannot have given, whose patterns are left out.
+    pub outliers: Vec<OutlierReport>,
+    /// What contradicts the readings.
+    pub warnings: Vec<String>,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+}
+
+/// A file without an image.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Skipped {
+    /// The file.
+    pub file: PathBuf,
+    /// Why it has no image, in one line.
+    pub reason: String,
+}
+
+/// What many files give.
+#[derive(Debug, Default)]
+pub struct ManyImages {
+    /// The images, in the order of the files. All have one side: that of the first.
+    pub images: Vec<FileImage>,
+    /// The files that give none.
+    pub skipped: Vec<Skipped>,
+}
+
+/// Why a file gives no image.
+#[derive(Debug, Error)]
+enum NoImage {
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    #[error("{}: images of {n} x {n}, expected {expected} x {expected} as of the first file", .file.display())]
+    Side { file: PathBuf, n: usize, expected: usize },
+}
+
+/// Makes the image of each measurement of these files: all measurements of a measurement file, the sum
+/// of a recording's frames. With [`SourceOptions::index`], that one measurement of each file, or each
+/// frame of each recording. `done` is called after each file, from any thread.
+#[must_use]
+pub fn many_images(
+    files: &[PathBuf],
+    options: &SourceOptions,
+    solver: &Solver,
+    done: &(dyn Fn() + Sync),
+) -> ManyImages {
+    let made: Vec<_> = files
+        .par_iter()
+        .map(|file| {
+            let made = images_of(file, options, solver);
+            done();
+            made
+        })
+        .collect();
+    let mut all = ManyImages::default();
+    for (file, made) in files.iter().zip(made) {
+        match made.and_then(|images| of_one_side(file, images, &all.images)) {
+            Ok(images) => all.images.extend(images),
+            Err(error) => {
+                all.skipped.push(Skipped { file: file.clone(), reason: in_one_line(&error) });
+            }
+        }
+    }
+    all
+}
+
+fn of_one_side(
+    file: &Path,
+    images: Vec<FileImage>,
+    before: &[FileImage],
+) -> Result<Vec<FileImage>, NoImage> {
+    let side = |images: &[FileImage]| images.first().map(|found| found.image.side().pixels());
+    match (side(&images), side(before)) {
+        (Some(n), Some(expected)) if n != expected => {
+            Err(NoImage::Side { file: file.to_owned(), n, expected })
+        }
+        _ => Ok(images),
+    }
+}
+
+fn images_of(
+    file: &Path,
+    options: &SourceOptions,
+    solver: &Solver,
+) -> Result<Vec<FileImage>, NoImage> {
+    let is_one = match options.index {
+        Some(Index::One(_)) => true,
+        Some(Index::All) => false,
+        None => options.fits_recording(file)?,
+    };
+    let sources = match is_one {
+        true => vec![Source::read(file, options)?],
+        false => Source::read_all(file, options)?,
+    };
+    let several = sources.len() > 1;
+    let image = |(index, source): (usize, Source)| -> Result<FileImage, NoImage> {
+        let Solved { image, with_readings, parts, used, order, report } =
+            solver.solve(file, &source)?;
+        Ok(FileImage {
+            file: file.to_owned(),
+            index: several.then_some(index),
+            image,
+            with_readings,
+            used: used.rows().clone(),
+            order,
+            complex: parts.is_some(),
+            recorded: source.frames.is_some(),
+            report,
+            outliers: source.outliers.iter().map(OutlierReport::of).collect(),
+            notes: losses(&source).chain(source.notes.iter().cloned()).collect(),
+            taken: source.taken,
+            warnings: source.warnings,
+        })
+    };
+    sources.into_iter().enumerate().map(image).collect()
+}
+
+/// The readings that a measurement lacks, in words.
+pub fn losses(source: &Source) -> impl Iterator<Item = String> {
+    let dropped = |lost: &nirspi_recon::Dropout| {
+        format!("drop-out: {} from y[{}] on", count_of(lost.length, "reading"), lost.start)
+    };
+    let not_read = (!source.not_read.is_empty()).then(|| not_read_words(&source.not_read));
+    source.dropouts.iter().map(dropped).chain(not_read)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reconstruct::Recipe;
+    use crate::source::FirstPatterns;
+    use nirspi_recon::Sampling;
+    use nirspi_recon::reconstruct::{Method, MethodSettings};
+    use std::fmt::Write;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    fn solver() -> Solver {
+        Solver::new(Recipe {
+            method: Method::HADAMARD,
+            settings: MethodSettings::default(),
+            dictionary: None,
+            first: FirstPatterns::Recorded,
+            sampling: Sampling::ALL,
+        })
+        .unwrap()
+    }
+
+    /// A measurement of n x n patterns, whose readings depend on `number`.
+    fn measured(folder: &Path, number: usize, n: usize) -> PathBuf {
+        let mut text = "n,h_row,d\n".to_owned();
+        for row in 0..n * n {
+            writeln!(text, "{n},{row},{}.5", (row * 7 + number * 11) % 31).unwrap();
+        }
+        let path = folder.join(format!("{number:02}.csv"));
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    #[test]
+    fn images_are_those_of_the_files_alone_in_their_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<PathBuf> = (0..40).map(|k| measured(folder.path(), k, 8)).collect();
+        let (options, solver, done) = (SourceOptions::default(), solver(), AtomicUsize::new(0));
+        let made = many_images(&files, &options, &solver, &|| {
+            done.fetch_add(1, Ordering::Relaxed);
+        });
+        assert_eq!((made.skipped, done.into_inner()), (Vec::new(), 40));
+        assert!(made.images.iter().map(|image| &image.file).eq(&files));
+        for image in &made.images {
+            let source = Source::read(&image.file, &options).unwrap();
+            let alone = solver.solve(&image.file, &source).unwrap();
+            assert_eq!(image.image.pixels(), alone.image.pixels());
+            assert_eq!((image.index, image.used.len()), (None, 64));
+        }
+        assert_ne!(made.images[0].image.pixels(), made.images[1].image.pixels());
+    }
+
+    #[test]
+    fn a_file_without_an_image_is_named_and_the_others_are_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, last] = [1, 2].map(|k| measured(folder.path(), k, 8));
+        let other_side = measured(folder.path(), 3, 4);
+        let gone = folder.path().join("gone.csv");
+        let files = [first.clone(), gone.clone(), other_side.clone(), last.clone()];
+        let made = many_images(&files, &SourceOptions::default(), &solver(), &|| {});
+        let with: Vec<&PathBuf> = made.images.iter().map(|image| &image.file).collect();
+        let without: Vec<&PathBuf> = made.skipped.iter().map(|skipped| &skipped.file).collect();
+        assert_eq!((with, without), (vec![&first, &last], vec![&gone, &other_side]));
+        assert!(made.skipped[0].reason.contains("no such file"), "{:?}", made.skipped);
+        assert!(made.skipped[1].reason.contains("images of 4 x 4, expected 8 x 8"));
+        assert!(made.skipped.iter().all(|skipped| !skipped.reason.contains('\n')));
+    }
+}
