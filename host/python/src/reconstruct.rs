@@ -9,7 +9,6 @@ use crate::measurement::{self, numbers};
 use crate::orders::named;
 use crate::work::{backend, long};
 use nirspi::imaging::MethodReport;
-use nirspi::reconstruct::Recipe;
 use nirspi::source::{FirstPatterns, Index, Several};
 use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
@@ -58,21 +57,6 @@ pub(crate) struct Options<'py> {
 }
 
 impl Options<'_> {
-    /// These options, with atoms of a file.
-    pub(crate) fn recipe(&self, dictionary: Option<PathBuf>) -> PyResult<Recipe> {
-        if self.warm_start {
-            return Err(refused("warm_start belongs to the frames of one file, not to a table"));
-        }
-        let sampling = self.sampling.parse().map_err(|error| self.of_sampling(&error))?;
-        Ok(Recipe {
-            method: self.method()?,
-            settings: self.settings()?,
-            dictionary,
-            first: self.first()?,
-            sampling,
-        })
-    }
-
     fn of_sampling(&self, error: &SamplingError) -> PyErr {
         refused(format!("sampling is {}, {error}", self.sampling))
     }
