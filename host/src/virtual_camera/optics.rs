@@ -411,7 +411,7 @@ mod tests {
     fn the_serial_number_of_a_described_camera_is_frozen() {
         let camera = CameraModel::parse("[adc]\nlatency_clocks = 9").unwrap();
         let optics = VirtualOptics::of(&camera, Scene::white(), 300.0).unwrap();
-        assert_eq!(optics.serial(1), "virtual-1-884f6b2b");
+        assert_eq!(optics.serial(1), "virtual-1-ac031031");
     }
 
     #[test]
