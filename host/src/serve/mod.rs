@@ -44,6 +44,8 @@ mod overload;
 #[cfg(feature = "serve")]
 mod page;
 #[cfg(feature = "serve")]
+mod pages;
+#[cfg(feature = "serve")]
 mod server;
 pub mod settings;
 #[cfg(feature = "virtual-camera")]
@@ -106,6 +108,9 @@ struct Shared {
     overload: Mutex<Overload>,
     over: AtomicBool,
     viewers: AtomicUsize,
+    /// The pages that ask for states.
+    #[cfg(feature = "serve")]
+    pages: Mutex<pages::Pages>,
     /// What viewers such as Foxglove get, if there is a server for them.
     #[cfg(feature = "serve")]
     foxglove: Option<foxglove::Foxglove>,
@@ -126,6 +131,8 @@ impl Shared {
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
             #[cfg(feature = "serve")]
+            pages: Mutex::default(),
+            #[cfg(feature = "serve")]
             foxglove: None,
         }
     }
@@ -134,8 +141,13 @@ impl Shared {
         self.over.load(Ordering::Relaxed)
     }
 
+    /// Number of pages, and of scripts that read the stream of states.
     fn viewers(&self) -> usize {
-        self.viewers.load(Ordering::Relaxed)
+        #[cfg(feature = "serve")]
+        let pages = lock(&self.pages).count(tokio::time::Instant::now());
+        #[cfg(not(feature = "serve"))]
+        let pages = 0;
+        pages + self.viewers.load(Ordering::Relaxed)
     }
 
     /// The numbers of the viewers such as Foxglove; `None` without a server for them.
