@@ -142,14 +142,35 @@ fn switched_off(fault: Fault) -> String {
 /// # Errors
 /// If the link ends.
 pub(super) fn darken(shared: &Shared, session: &mut Session) -> Result<bool, SessionError> {
-    // The camera's own word counts, whatever was sent before.
-    let dark = session.status(&mut EventLog(shared))?.state != Device::Running;
-    if !dark {
-        session.command(request::Stop, &mut EventLog(shared))?;
-    }
+    let dark = is_dark(shared, session)?;
     let leds = if dark { Leds::Off } else { Leds::On };
     shared.enter(Phase::Stopped, leds, "stopped: a person switched the LEDs off".to_owned());
     Ok(dark)
+}
+
+/// Asks a camera whether its LEDs are off, and stops it if they are not. Records the camera's answer, or
+/// that it gave none.
+///
+/// # Errors
+/// If the link ends.
+pub(super) fn is_dark(shared: &Shared, session: &mut Session) -> Result<bool, SessionError> {
+    // The camera's own word counts, whatever was sent before.
+    let mut ask = || {
+        let dark = session.status(&mut EventLog(shared))?.state != Device::Running;
+        if !dark {
+            session.command(request::Stop, &mut EventLog(shared))?;
+        }
+        Ok(dark)
+    };
+    let answer = ask();
+    let leds = match answer {
+        Ok(true) => Leds::Off,
+        Ok(false) => Leds::On,
+        Err(_) => Leds::Unknown,
+    };
+    lock(&shared.camera).camera.leds_are(leds);
+    shared.slot.wake();
+    answer
 }
 
 /// Adds events to the log, and ignores frames.
@@ -177,7 +198,7 @@ impl Shared {
     /// Records a new phase, and tells pages at once.
     pub(super) fn enter(&self, phase: Phase, leds: Leds, line: String) {
         let mut log = lock(&self.camera);
-        log.camera.leds = leds;
+        log.camera.leds_are(leds);
         log.enter(phase, line);
         drop(log);
         self.slot.wake();

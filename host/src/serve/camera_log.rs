@@ -2,7 +2,7 @@
 
 use super::light::Leds;
 use crate::boards;
-use crate::clock;
+use crate::clock::{self, Instant};
 use crate::events::Level;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
@@ -10,6 +10,10 @@ use crate::versions::{self, Part};
 use nirspi_wire::Status;
 use serde::Serialize;
 use std::collections::VecDeque;
+use std::time::Duration;
+
+/// How long the camera's word that its LEDs are off holds. A dark camera is asked every second.
+const CONFIRMED: Duration = Duration::from_secs(2);
 
 /// Number of events kept for pages that connect later.
 const EVENTS: usize = 100;
@@ -47,12 +51,37 @@ pub struct CameraState {
     line: String,
     /// What is known of the LEDs.
     pub leds: Leds,
+    /// How long ago the LEDs were last known to be on or off, in milliseconds.
+    leds_age_ms: u64,
+    /// When the LEDs were last known to be on or off.
+    #[serde(skip)]
+    leds_known: Instant,
     pub(super) identity: CameraIdentity,
     versions: Vec<Part>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measurement: Option<Measurement>,
     /// What the camera last said of itself.
     pub said: Said,
+}
+
+impl CameraState {
+    /// Records what is known of the LEDs now.
+    pub fn leds_are(&mut self, leds: Leds) {
+        self.leds = leds;
+        if leds != Leds::Unknown {
+            self.leds_known = Instant::now();
+        }
+    }
+
+    /// Makes this the state at a later moment: LEDs that were off too long ago may be on again. LEDs that
+    /// were switched on count as on until the camera has confirmed that they are off.
+    pub fn age(&mut self, now: Instant) {
+        let age = now.saturating_duration_since(self.leds_known);
+        self.leds_age_ms = age.as_millis() as u64;
+        if self.leds == Leds::Off && age > CONFIRMED {
+            self.leds = Leds::Unknown;
+        }
+    }
 }
 
 /// What a camera last said of itself beside its frames.
@@ -114,6 +143,8 @@ impl CameraLog {
             phase: Phase::Preparing,
             line: String::new(),
             leds: Leds::Off,
+            leds_age_ms: 0,
+            leds_known: Instant::now(),
             identity: identity.clone(),
             versions: Vec::new(),
             measurement: None,
@@ -131,7 +162,7 @@ impl CameraLog {
         self.camera.versions = versions::compare(identity, None);
         self.camera.measurement = None;
         // A greeting ends the session before, and light with it.
-        self.camera.leds = Leds::Off;
+        self.camera.leds_are(Leds::Off);
         self.enter(Phase::Preparing, "preparing: latency and settling are measured".to_owned());
         self.camera.said.status = None;
         self.event(Level::Info, format!("connected to {} {}", identity.board, identity.serial));
@@ -175,9 +206,8 @@ impl CameraLog {
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_newest_events_are_kept_and_no_more() {
-        let identity = CameraIdentity {
+    fn identity() -> CameraIdentity {
+        CameraIdentity {
             protocol: 1,
             firmware: "1".to_owned(),
             gateware: "1".to_owned(),
@@ -187,8 +217,31 @@ mod tests {
             adc_bits: 1,
             wavelength_nm: 1,
             capabilities: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_word_that_leds_are_off_does_not_last() {
+        let mut camera = CameraLog::new("test", &identity()).camera;
+        let seen = |camera: &CameraState, ms| {
+            let mut later = camera.clone();
+            later.age(camera.leds_known + Duration::from_millis(ms));
+            (later.leds, later.leds_age_ms)
         };
-        let mut log = CameraLog::new("test", &identity);
+        camera.leds_are(Leds::Off);
+        assert_eq!(seen(&camera, 1900), (Leds::Off, 1900));
+        assert_eq!(seen(&camera, 2100), (Leds::Unknown, 2100));
+        camera.leds_are(Leds::On);
+        assert_eq!(seen(&camera, 9000), (Leds::On, 9000));
+        // What is not known is as old as what was known before.
+        let known = camera.leds_known;
+        camera.leds_are(Leds::Unknown);
+        assert_eq!(camera.leds_known, known);
+    }
+
+    #[test]
+    fn the_newest_events_are_kept_and_no_more() {
+        let mut log = CameraLog::new("test", &identity());
         for number in 1..=3 * EVENTS {
             log.event(Level::Info, number.to_string());
         }

@@ -21,7 +21,7 @@ use crate::provenance::{Made, Taken};
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{ConnectInfo, DefaultBodyLimit, Request, State};
-use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, Uri, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, Sse};
 use axum::response::{IntoResponse, Redirect, Response};
@@ -45,6 +45,10 @@ const TICK: Duration = Duration::from_millis(50);
 const MAX_CHANGE_BYTES: usize = 4096;
 /// The most bytes of a message with a scene.
 const MAX_SCENE_BYTES: usize = 1 << 16;
+/// The longest wait for a new state.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// The header with the age of a state in milliseconds.
+const AGE: HeaderName = HeaderName::from_static("state-age-ms");
 /// The path of messages with scenes.
 const SCENE: &str = "/api/scene";
 /// The path of messages that switch the light off.
@@ -116,6 +120,7 @@ fn routes(app: App) -> Router {
     Router::new()
         .merge(page::routes())
         .route("/events", get(events))
+        .route("/api/next", get(next_state))
         .route("/api/state", get(state))
         .route("/api/settings", post(settings))
         .route(STOP, post(stop))
@@ -160,7 +165,7 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
         // The browser keeps the token as a cookie, and the address without the token.
         if request.method() == Method::GET && uri.path() == "/" && token::in_query(uri).is_some() {
             let cookie = [(header::SET_COOKIE, token.cookie(port))];
-            return Some((cookie, Redirect::to("/")).into_response());
+            return Some((cookie, Redirect::to("./")).into_response());
         }
     }
     let most = if uri.path() == SCENE { MAX_SCENE_BYTES } else { MAX_CHANGE_BYTES };
@@ -190,7 +195,7 @@ fn line(status: StatusCode, text: &impl ToString) -> Response {
 }
 
 async fn nothing_there() -> Response {
-    let there = "nothing there, expected /, /events, /api/state, /api/settings, /api/scene, /api/stop, \
+    let there = "nothing there, expected /, /events, /api/state, /api/next, /api/settings, /api/scene, /api/stop, \
                  /api/start, /image.png, /enhanced.png, /image.npy or /enhanced.npy";
     line(StatusCode::NOT_FOUND, &there)
 }
@@ -204,6 +209,33 @@ async fn state(State(app): State<App>) -> Response {
         "" => line(StatusCode::SERVICE_UNAVAILABLE, &"nothing has happened yet, ask again"),
         state => json(format!("{state}\n")),
     }
+}
+
+/// The newest state with its images, once its number is another than `seen` of the query, or after a second.
+/// The page has the number `page`. Each page asks again and again, so that no page needs a connection of its own.
+async fn next_state(State(app): State<App>, uri: Uri) -> Response {
+    let mut published = app.published.clone();
+    let given = |name: &str| {
+        let mut pairs = uri.query().unwrap_or_default().split('&');
+        pairs.find_map(|pair| pair.strip_prefix(name)?.strip_prefix('=')?.parse::<u64>().ok())
+    };
+    let seen = given("seen");
+    let is_new = |moment: &Arc<Published>| !moment.message.is_empty() && Some(moment.number) != seen;
+    // What there is after a second is the answer, and so it is when the server stops.
+    let _ = tokio::time::timeout(PATIENCE, published.wait_for(is_new)).await;
+    let moment = Arc::clone(&published.borrow());
+    let Some(made) = moment.made else {
+        return line(StatusCode::SERVICE_UNAVAILABLE, &"nothing has happened yet, ask again");
+    };
+    if let Some(page) = given("page") {
+        let image = moment.picture.as_ref().map_or(0, |picture| picture.number);
+        let is_new = lock(&app.shared.pages).gets(page, image, tokio::time::Instant::now());
+        if let Some(picture) = moment.picture.as_ref().filter(|_| is_new) {
+            app.shared.passed(Passed::Sent, picture.arrived);
+        }
+    }
+    let age = [(AGE, made.elapsed().as_millis().to_string())];
+    (age, json(moment.message.clone())).into_response()
 }
 
 async fn image(State(app): State<App>) -> Response {

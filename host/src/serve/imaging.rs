@@ -21,7 +21,7 @@ use nirspi_recon::reconstruct::{
 };
 use nirspi_recon::{Measurements, Side};
 use serde::Serialize;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use thiserror::Error;
 
 /// Why the newest frames gave no picture.
@@ -298,49 +298,67 @@ struct Enhancement {
     enhance_ms: f64,
 }
 
-/// Makes one image after the other, and the state around it.
-pub(super) struct Studio {
-    imaging: Imaging,
-    white: SteadyWhite,
-    moving: Moving,
+/// What pages are told of the images.
+pub(super) struct Told {
     picture: Option<Arc<Picture>>,
     problem: Option<String>,
     frames: Rate,
     images: Rate,
+    /// Number of states.
+    states: u64,
+}
+
+/// Makes one image after the other, and the state around it.
+///
+/// An image may take long. What pages are told of it is behind a lock of its own, so that another
+/// thread can make states meanwhile.
+pub(super) struct Studio {
+    imaging: Imaging,
+    white: SteadyWhite,
+    moving: Moving,
+    told: Arc<Mutex<Told>>,
 }
 
 impl Studio {
     /// A studio without images.
     pub(super) fn new(imaging: Imaging) -> Self {
-        let (white, started) = (SteadyWhite::default(), Instant::now());
+        let started = Instant::now();
         let (frames, images) = (Rate::new(started), Rate::new(started));
-        let moving = Moving::default();
-        Self { imaging, white, moving, picture: None, problem: None, frames, images }
+        let told = Told { picture: None, problem: None, frames, images, states: 0 };
+        let (white, moving) = (SteadyWhite::default(), Moving::default());
+        Self { imaging, white, moving, told: Arc::new(Mutex::new(told)) }
     }
 
-    /// Makes the image of a look taken from the slot, if there is one, and the state of this moment.
+    /// What pages are told of the images.
+    pub(super) fn told(&self) -> Arc<Mutex<Told>> {
+        Arc::clone(&self.told)
+    }
+
+    /// Makes the image of a look taken from the slot.
+    pub(super) fn make(&mut self, shared: &Shared, look: &Look) {
+        let mut settings = lock(&shared.settings).clone();
+        settings.enhance &= !shared.shed().enhancement_off;
+        if self.moving.awaits(look, &settings) {
+            let scene = (&mut self.white, &mut self.moving);
+            let made = self.imaging.picture(look, &settings, scene, shared);
+            let told = &mut *lock(&self.told);
+            match made {
+                Ok(made) => (told.picture, told.problem) = (Some(Arc::new(made)), None),
+                Err(why) => told.problem = Some(causes::in_one_line(&why)),
+            }
+            shared.slot.done(told.problem.is_none());
+        } else {
+            shared.slot.leave();
+        }
+    }
+}
+
+impl Told {
+    /// The state of this moment.
     ///
     /// # Errors
     /// Does not occur: every field can be written as JSON.
-    pub(super) fn turn(
-        &mut self,
-        shared: &Shared,
-        look: Option<&Look>,
-    ) -> serde_json::Result<Published> {
-        if let Some(look) = look {
-            let mut settings = lock(&shared.settings).clone();
-            settings.enhance &= !shared.shed().enhancement_off;
-            if self.moving.awaits(look, &settings) {
-                let scene = (&mut self.white, &mut self.moving);
-                match self.imaging.picture(look, &settings, scene, shared) {
-                    Ok(made) => (self.picture, self.problem) = (Some(Arc::new(made)), None),
-                    Err(why) => self.problem = Some(causes::in_one_line(&why)),
-                }
-                shared.slot.done(self.problem.is_none());
-            } else {
-                shared.slot.leave();
-            }
-        }
+    pub(super) fn state(&mut self, shared: &Shared) -> serde_json::Result<Published> {
         let now = Instant::now();
         let ledger = shared.slot.ledger();
         let rates = Rates {
@@ -349,9 +367,12 @@ impl Studio {
         };
         let settings = lock(&shared.settings).clone();
         // The log is copied, so that the camera's thread can add to the log meanwhile.
-        let log = lock(&shared.camera).clone();
+        let mut log = lock(&shared.camera).clone();
+        log.camera.age(now);
         let (allowed, commands) = shared.light.position();
+        self.states += 1;
         let state = State {
+            number: self.states,
             program: env!("CARGO_PKG_VERSION"),
             camera: &log.camera,
             light: Light { allowed, commands },

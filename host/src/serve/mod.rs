@@ -40,6 +40,8 @@ mod overload;
 #[cfg(feature = "serve")]
 mod page;
 #[cfg(feature = "serve")]
+mod pages;
+#[cfg(feature = "serve")]
 mod server;
 pub mod settings;
 #[cfg(feature = "virtual-camera")]
@@ -101,6 +103,9 @@ struct Shared {
     overload: Mutex<Overload>,
     over: AtomicBool,
     viewers: AtomicUsize,
+    /// The pages that ask for states.
+    #[cfg(feature = "serve")]
+    pages: Mutex<pages::Pages>,
 }
 
 impl Shared {
@@ -117,6 +122,8 @@ impl Shared {
             overload: Mutex::default(),
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
+            #[cfg(feature = "serve")]
+            pages: Mutex::default(),
         }
     }
 
@@ -124,8 +131,13 @@ impl Shared {
         self.over.load(Ordering::Relaxed)
     }
 
+    /// Number of pages, and of scripts that read the stream of states.
     fn viewers(&self) -> usize {
-        self.viewers.load(Ordering::Relaxed)
+        #[cfg(feature = "serve")]
+        let pages = lock(&self.pages).count(tokio::time::Instant::now());
+        #[cfg(not(feature = "serve"))]
+        let pages = 0;
+        pages + self.viewers.load(Ordering::Relaxed)
     }
 
     /// A frame that arrived at this moment, or its image, has passed this stage now.

@@ -100,6 +100,8 @@ impl<'s> Offered<'s> {
 /// The state without pixels; the response of `GET /api/state`.
 #[derive(Debug, Serialize)]
 pub struct State<'s> {
+    /// Number of this state: the first has number 1, each further one the next number.
+    pub number: u64,
     /// Version of this program.
     pub program: &'static str,
     /// The camera.
@@ -154,6 +156,12 @@ struct Message<'s> {
 /// One state, encoded for sending.
 #[derive(Debug, Default)]
 pub struct Published {
+    /// The number of the state.
+    #[cfg(feature = "serve")]
+    pub number: u64,
+    /// When the state was made; `None` before the first.
+    #[cfg(feature = "serve")]
+    pub made: Option<Instant>,
     /// The state as JSON, without pixels.
     #[cfg(feature = "serve")]
     pub state: String,
@@ -180,6 +188,10 @@ impl Published {
         };
         Ok(Self {
             message: serde_json::to_string(&message)?,
+            #[cfg(feature = "serve")]
+            number: state.number,
+            #[cfg(feature = "serve")]
+            made: Some(Instant::now()),
             #[cfg(feature = "serve")]
             state: serde_json::to_string_pretty(state)?,
             #[cfg(feature = "serve")]

@@ -341,7 +341,9 @@ impl Paper {
     /// Publishes a state of this number and of so many bytes.
     fn publish(&self, number: usize, bytes: usize) {
         let message = format!("{number}{}", ".".repeat(bytes));
-        self.publish.send_replace(Arc::new(Published { message, ..Published::default() }));
+        let (number, made) = (number as u64, Some(Instant::now()));
+        let published = Published { number, made, message, ..Published::default() };
+        self.publish.send_replace(Arc::new(published));
     }
 
     fn end(self) {
@@ -364,6 +366,94 @@ fn a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest() {
     let seen: Vec<usize> = idle.by_ref().take_while(|&number| number < LAST).collect();
     assert!(seen.is_sorted() && seen.len() < LAST / 2, "{seen:?}");
     paper.end();
+}
+
+#[test]
+fn a_page_that_asks_gets_each_state_once_with_its_age_and_waits_for_the_next() {
+    let paper = Paper::new();
+    let ask = |query: &str| {
+        let mut stream = TcpStream::connect(paper.address).unwrap();
+        stream.set_read_timeout(Some(LIMIT)).unwrap();
+        let host = paper.address;
+        write!(stream, "GET /api/next{query} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n")
+            .unwrap();
+        let began = Instant::now();
+        let answer = io::read_to_string(stream).unwrap();
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        let age = head.lines().find_map(|line| line.strip_prefix("state-age-ms: ")?.parse().ok());
+        (head[9..12].to_owned(), body.trim_end().to_owned(), age.unwrap_or(0u64), began.elapsed())
+    };
+    let second = Duration::from_secs(1);
+    let (status, _, _, took) = ask("");
+    assert!(status == "503" && took >= second, "there is no state yet");
+    paper.publish(7, 0);
+    std::thread::sleep(Duration::from_millis(300));
+    let (_, body, age, took) = ask("?seen=6&page=1");
+    assert!(body == "7" && age >= 300 && took < second, "{body}, {age} ms old, after {took:?}");
+    // Only another state is an answer at once: what was seen comes after a second, with its age.
+    let (_, body, age, took) = ask("?seen=7&page=2");
+    assert!(body == "7" && age >= 1300 && took >= second, "{body}, {age} ms old, after {took:?}");
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(Duration::from_millis(200));
+            paper.publish(8, 0);
+        });
+        let (_, body, age, took) = ask("?page=2&seen=7");
+        assert!(body == "8" && age < 1000 && took < second, "{body}, {age} ms old, after {took:?}");
+    });
+    assert_eq!(paper.shared.viewers(), 2);
+    paper.end();
+}
+
+#[test]
+fn states_come_while_an_image_takes_long() {
+    const TOOK: Duration = Duration::from_secs(4);
+    let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
+    lock(&shared.settings).method = "slow";
+    let (publish, published) = watch::channel(Arc::new(Published::default()));
+    let making = {
+        let shared = Arc::clone(&shared);
+        let imaging =
+            Imaging::new(&nirspi_nets::prior::settings(), nirspi_nets::Device::cpu()).unwrap();
+        let imaging = imaging.with_method("slow", Box::new(Slow(TOOK)));
+        std::thread::spawn(move || images(&shared, imaging, &publish))
+    };
+    let run = Arc::new(RunSetup { setup: setup(), settling: None, flat_field: None });
+    let sum = crate::integrate::Integrated::new(&run.setup);
+    let look = Look { sum, run, depth: None, arrived: Instant::now(), newest: 1 };
+    shared.slot.offer(look, crate::account::LossCounters::default());
+    until("begun", || shared.slot.ledger().images.waiting == 1 && published.borrow().number > 0);
+    let (began, before) = (Instant::now(), published.borrow().number);
+    std::thread::sleep(TOOK / 2);
+    let made = published.borrow().number - before;
+    // Twice a second, on a busy machine too.
+    assert!(began.elapsed() >= TOOK || made >= 3, "{made} states in {:?}", began.elapsed());
+    assert!(published.borrow().made.unwrap().elapsed() < Duration::from_secs(1));
+    shared.over.store(true, Ordering::Relaxed);
+    making.join().unwrap();
+}
+
+/// After a fault the link used to be closed, and the page went on saying "LEDs off" whatever the camera did.
+#[test]
+fn a_camera_that_has_switched_its_leds_off_is_asked_and_its_word_does_not_last() {
+    let lab = Lab::new(Before::Nothing);
+    lab.hands.open.store(true, Ordering::Relaxed);
+    until("off", || lab.phase() == Phase::Fault);
+    let seen = || {
+        let mut camera = lock(&lab.shared.camera).camera.clone();
+        camera.age(Instant::now());
+        camera.leds
+    };
+    std::thread::sleep(Duration::from_millis(2500));
+    assert_eq!(seen(), Leds::Off, "the camera has been asked again");
+    lab.hands.stuck.store(true, Ordering::Relaxed);
+    let began = Instant::now();
+    until("not known", || seen() == Leds::Unknown);
+    assert!(began.elapsed() < Duration::from_millis(3500), "{:?}", began.elapsed());
+    assert_eq!(lab.phase(), Phase::Fault);
+    lab.hands.open.store(false, Ordering::Relaxed);
+    lab.resumes();
+    lab.end();
 }
 
 #[test]

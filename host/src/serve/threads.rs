@@ -6,10 +6,10 @@
 //! (`a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest`), both in
 //! `host/src/serve/tests.rs`.
 
-use super::camera::{End, EventLog, Live, Next, darken, reconnect, why_dark};
+use super::camera::{End, EventLog, Live, Next, darken, is_dark, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};
 use super::delays::DelayState;
-use super::imaging::Studio;
+use super::imaging::{Studio, Told};
 use super::light::Leds;
 use super::overload::Shed;
 use super::settings::{Offer, Settings};
@@ -21,7 +21,7 @@ use crate::causes;
 use crate::session::{Session, SessionError};
 use std::fmt;
 use std::io;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -150,15 +150,15 @@ pub(super) fn measure(
             Some(why) => End::Dark(why),
             None => session(&mut live, shared, &mut connected)?,
         };
-        // The old link is closed before reconnecting.
-        drop(connected);
         match live.ended(end) {
             Next::Connect { person_said: said } => person_said = said,
-            Next::Retry => rest(shared, RETRY),
+            Next::Retry => {
+                // The old link is closed before reconnecting.
+                drop(connected);
+                rest(shared, RETRY);
+            }
             Next::Person => {
-                while !shared.is_over() && !shared.light.is_on() {
-                    std::thread::sleep(TICK);
-                }
+                await_person(shared, &mut connected.session);
                 person_said = true;
             }
         }
@@ -215,6 +215,20 @@ fn stopped(shared: &Shared, session: &mut Session) -> Result<(), SessionError> {
     Ok(())
 }
 
+/// Asks a camera that has switched its LEDs off, or must not measure, whether they are off, until a
+/// person allows light. When the link ends, what is known of the LEDs ends too.
+fn await_person(shared: &Shared, session: &mut Session) {
+    let mut asked: Option<Instant> = None;
+    let mut is_linked = true;
+    while !shared.is_over() && !shared.light.is_on() {
+        if is_linked && asked.is_none_or(|asked| asked.elapsed() > ASK) {
+            is_linked = is_dark(shared, session).is_ok();
+            asked = Some(Instant::now());
+        }
+        std::thread::sleep(TICK);
+    }
+}
+
 /// Waits for `time`, or until the server stops.
 fn rest(shared: &Shared, time: Duration) {
     let started = Instant::now();
@@ -224,27 +238,66 @@ fn rest(shared: &Shared, time: Duration) {
 }
 
 /// Makes images and publishes them until the server stops. While images are left out to save work, the thread
-/// rests after each image for the time of those left out, and pages get only what else is new.
+/// rests after each image for the time of those left out, and pages get only what else is new. States come twice
+/// a second at least, however long an image takes.
 pub(super) fn images(shared: &Shared, imaging: Imaging, publish: &watch::Sender<Arc<Published>>) {
     let mut studio = Studio::new(imaging);
+    let told = studio.told();
     let mut next_image = Instant::now();
-    while !shared.is_over() {
-        let turn = Instant::now();
-        let look = match next_image.checked_duration_since(turn) {
-            None | Some(Duration::ZERO) => shared.slot.take(HEARTBEAT),
-            Some(rest) => {
-                shared.slot.await_news(rest.min(HEARTBEAT));
-                None
+    let ended = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !shared.is_over() && !ended.load(Ordering::Relaxed) {
+                tell(shared, &told, publish, Some(HEARTBEAT));
+                std::thread::sleep(TICK);
             }
-        };
-        let began = Instant::now();
-        if let Ok(published) = studio.turn(shared, look.as_ref()) {
-            publish.send_replace(Arc::new(published));
+        });
+        // The other thread ends even if this one panics.
+        let _ended = SetOnDrop(&ended);
+        while !shared.is_over() {
+            let turn = Instant::now();
+            let look = match next_image.checked_duration_since(turn) {
+                None | Some(Duration::ZERO) => shared.slot.take(HEARTBEAT),
+                Some(rest) => {
+                    shared.slot.await_news(rest.min(HEARTBEAT));
+                    None
+                }
+            };
+            let began = Instant::now();
+            if let Some(look) = &look {
+                studio.make(shared, look);
+                next_image = Instant::now() + given_up(shared.shed(), began.elapsed());
+            }
+            tell(shared, &told, publish, None);
+            std::thread::sleep(PACE.saturating_sub(turn.elapsed()));
         }
-        if look.is_some() {
-            next_image = Instant::now() + given_up(shared.shed(), began.elapsed());
-        }
-        std::thread::sleep(PACE.saturating_sub(turn.elapsed()));
+    });
+}
+
+/// Publishes the state of this moment, unless the last one is younger than `than`. The lock is held, so that no
+/// state takes the place of a later one.
+fn tell(
+    shared: &Shared,
+    told: &Mutex<Told>,
+    publish: &watch::Sender<Arc<Published>>,
+    than: Option<Duration>,
+) {
+    let mut told = lock(told);
+    let age = publish.borrow().made.map(|made| made.elapsed());
+    if than.is_some_and(|than| age.is_some_and(|age| age < than)) {
+        return;
+    }
+    if let Ok(published) = told.state(shared) {
+        publish.send_replace(Arc::new(published));
+    }
+}
+
+/// Sets a flag when dropped.
+struct SetOnDrop<'f>(&'f AtomicBool);
+
+impl Drop for SetOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
     }
 }
 

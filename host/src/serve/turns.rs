@@ -9,7 +9,7 @@
 //! the same images on every machine (`host/web/tests/check.py` compares WebAssembly with native
 //! code).
 
-use super::camera::{End, Live, Next, darken, reconnect, why_dark};
+use super::camera::{End, Live, Next, darken, is_dark, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};
 use super::imaging::Studio;
 use super::light::Leds;
@@ -17,7 +17,7 @@ use super::line::{Line, LineError};
 use super::settings::{Offer, Settings};
 use super::stage::Stage;
 use super::state::Published;
-use super::{CameraSource, Connected, ForeignError, Imaging, Shared, commands};
+use super::{CameraSource, Connected, ForeignError, Imaging, Shared, commands, lock};
 use crate::capture::Run;
 use crate::causes;
 use crate::clock::Instant;
@@ -46,8 +46,9 @@ enum Doing {
     Dark { connected: Connected, asked: Option<Instant> },
     /// A run.
     Measuring { connected: Connected, run: Box<Run> },
-    /// Waits for a person to allow light.
-    Waiting,
+    /// Waits for a person to allow light, and asks the camera meanwhile whether it is dark, as long as it
+    /// answers.
+    Waiting { connected: Option<Connected>, asked: Option<Instant> },
 }
 
 /// A camera and its page, in turns.
@@ -96,7 +97,11 @@ impl Turns {
     pub fn turn(&mut self) -> &str {
         self.camera();
         let look = self.shared.slot.take_now();
-        if let Ok(published) = self.studio.turn(&self.shared, look.as_ref()) {
+        if let Some(look) = look {
+            self.studio.make(&self.shared, &look);
+        }
+        let state = lock(&self.studio.told()).state(&self.shared);
+        if let Ok(published) = state {
             self.published = published;
         }
         &self.published.message
@@ -131,13 +136,13 @@ impl Turns {
         self.doing = match mem::replace(&mut self.doing, away) {
             Doing::Away { after, person_said } if after > now => Doing::Away { after, person_said },
             Doing::Away { person_said, .. } => self.connect(now, person_said),
-            Doing::Waiting if self.shared.light.is_on() => {
+            Doing::Waiting { .. } if self.shared.light.is_on() => {
                 Doing::Away { after: now, person_said: true }
             }
-            Doing::Waiting => Doing::Waiting,
+            Doing::Waiting { connected, asked } => self.await_person(connected, asked),
             Doing::Dark { connected, .. } if self.shared.stage.has_changed() => {
                 drop(connected);
-                self.ended(End::Scene)
+                self.ended(End::Scene, None)
             }
             Doing::Dark { connected, .. } if self.shared.light.is_on() => self.begin(connected),
             Doing::Dark { connected, asked } => self.wait(connected, asked),
@@ -150,7 +155,7 @@ impl Turns {
             Ok(mut connected) => {
                 let dark = if person_said { None } else { why_dark(&mut connected.session) };
                 if let Some(why) = dark {
-                    return self.ended(End::Dark(why));
+                    return self.ended(End::Dark(why), Some(connected));
                 }
                 self.live.greeted(&mut connected);
                 Doing::Dark { connected, asked: None }
@@ -171,8 +176,8 @@ impl Turns {
             Ok(run) => self.measure(connected, Box::new(run)),
             Err(error) => match self.live.captured(&connected, Err(error)) {
                 Ok(None) => Doing::Dark { connected, asked: None },
-                Ok(Some(end)) => self.ended(end),
-                Err(error) => self.ended(End::Gone(causes::in_one_line(&error))),
+                Ok(Some(end)) => self.ended(end, Some(connected)),
+                Err(error) => self.ended(End::Gone(causes::in_one_line(&error)), None),
             },
         }
     }
@@ -193,9 +198,21 @@ impl Turns {
         let captured = run.end(session, &mut self.live);
         match self.live.captured(&connected, captured) {
             Ok(None) => Doing::Dark { connected, asked: None },
-            Ok(Some(end)) => self.ended(end),
-            Err(error) => self.ended(End::Gone(causes::in_one_line(&error))),
+            Ok(Some(end)) => self.ended(end, Some(connected)),
+            Err(error) => self.ended(End::Gone(causes::in_one_line(&error)), None),
         }
+    }
+
+    /// A turn of a camera that waits for a person.
+    fn await_person(&self, mut connected: Option<Connected>, asked: Option<Instant>) -> Doing {
+        let is_due = asked.is_none_or(|asked| asked.elapsed() > PAUSE);
+        let Some(camera) = connected.as_mut().filter(|_| is_due) else {
+            return Doing::Waiting { connected, asked };
+        };
+        if is_dark(&self.shared, &mut camera.session).is_err() {
+            connected = None;
+        }
+        Doing::Waiting { connected, asked: Some(Instant::now()) }
     }
 
     /// A turn of a camera whose LEDs a person switched off.
@@ -211,16 +228,16 @@ impl Turns {
         };
         match ask() {
             Ok(()) => Doing::Dark { connected, asked },
-            Err(error) => self.ended(End::Gone(causes::in_one_line(&error))),
+            Err(error) => self.ended(End::Gone(causes::in_one_line(&error)), None),
         }
     }
 
-    fn ended(&mut self, end: End) -> Doing {
+    fn ended(&mut self, end: End, connected: Option<Connected>) -> Doing {
         let now = Instant::now();
         match self.live.ended(end) {
             Next::Connect { person_said } => Doing::Away { after: now, person_said },
             Next::Retry => Doing::Away { after: now + PAUSE, person_said: false },
-            Next::Person => Doing::Waiting,
+            Next::Person => Doing::Waiting { connected, asked: None },
         }
     }
 }

@@ -1,10 +1,11 @@
 // The connection to the camera's program, which runs in this page: in a worker, as WebAssembly.
 
+import { moment } from "./age.js";
 import { $, text } from "./dom.js";
 import { choose, isAsked, isOffered } from "./usb.js";
 
-// What the page says when the program has stopped.
-export const GONE = { line: "the program in this page has stopped; reload the page", leds: "the program has stopped" };
+// What the page says while the program does not answer.
+export const GONE = { line: "the program in this page does not answer", leds: "no answer from the program in this page" };
 
 const isReal = isAsked(location.href);
 const worker = new Worker(new URL(`worker.js${location.search}`, import.meta.url), { type: "module" });
@@ -14,14 +15,14 @@ let commands = 0, stopped = false;
 // Sends a command. Returns whether the program has executed the command, and the text of the answer.
 export function send(path, body) {
   // The simulated LEDs of a program that has stopped are gone with it; those of a real camera go out when it misses its host.
-  if (stopped) return Promise.resolve({ ok: path === "/api/stop" && !isReal, text: GONE.line });
+  if (stopped) return Promise.resolve({ ok: path === "/api/stop" && !isReal, isDark: !isReal, text: "the program in this page has stopped; reload the page" });
   return new Promise(answered => {
     waiting.set(++commands, answered);
     worker.postMessage({ id: commands, path, body: body ?? "" });
   });
 }
 
-// Calls `show` with each message, and `gone` with a line of text when no more messages come.
+// Calls `show` with each message and the moment at which it was true, and `gone` with a line of text when no more messages come.
 export function listen(show, gone) {
   const stop = why => {
     stopped = true;
@@ -33,7 +34,7 @@ export function listen(show, gone) {
   worker.onmessage = ({ data }) => {
     if (data.stopped) stop(data.stopped);
     else if (data.loading) text($("line"), data.loading);
-    else if (data.message) show(JSON.parse(data.message));
+    else if (data.message) show(JSON.parse(data.message), moment());
     else { waiting.get(data.id)?.(data); waiting.delete(data.id); }
   };
   worker.onerror = event => stop(`The program of this page did not start: ${event.message ?? "worker.js cannot be read"}`);

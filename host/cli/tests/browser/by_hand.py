@@ -1,5 +1,5 @@
 """Pages that the test tells a state by hand: each number, unit and warning in its place, what each control sends, and what a
-page does when its stream ends and comes back. No camera takes part, so every number is known."""
+page does when the program falls silent and comes back. No camera takes part, so every number is known."""
 
 import base64
 import copy
@@ -11,13 +11,32 @@ import struct
 from pictures import levels, numbers, png, rows
 from playwright.sync_api import expect
 
-# In place of the browser's own stream of messages and of its canvas: the test tells the messages, and sees what is written.
+# In place of the program's answers to "what is next?" and of the browser's canvas: the test tells the messages, and sees what is
+# written. The message that was told last is told again and again, as the program does, until the test silences it.
 IN_PLACE = """
-window.streams = [];
-window.EventSource = class {
-  constructor(address) { Object.assign(this, { address, isOpen: true }); window.streams.push(this); }
-  close() { this.isOpen = false; }
+window.asks = [];
+window.asked = 0;
+window.told = null;
+window.isSilent = false;
+const fetchBefore = window.fetch;
+window.fetch = (address, options) => !String(address).includes("api/next") ? fetchBefore(address, options)
+  : new Promise((answer, fail) => {
+    window.asked++;
+    const ask = { answer };
+    window.asks.push(ask);
+    options.signal.addEventListener("abort", () => {
+      window.asks = window.asks.filter(other => other !== ask);
+      fail(options.signal.reason);
+    });
+  });
+window.tell = (message, age = 0) => {
+  [window.told, window.toldAt] = [message, performance.now()];
+  for (const ask of window.asks.splice(0)) ask.answer(new Response(message, { headers: { "State-Age-Ms": age } }));
 };
+window.toldAt = 0;
+setInterval(() => {
+  if (window.told && !window.isSilent && performance.now() - window.toldAt > 1300) window.tell(window.told);
+}, 100);
 window.written = [];
 const fillText = CanvasRenderingContext2D.prototype.fillText;
 CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) { written.push(text); fillText.call(this, text, ...rest); };
@@ -39,7 +58,7 @@ def message(given):
     """A message in which no two numbers are equal."""
     state = copy.deepcopy(given)
     percentiles = [{"p50_ms": p50, "p99_ms": p99} for p50, p99 in [(1.2, 2.5), (3.4, 5.6), (7.8, 34.2), (12.4, 1234.5)]]
-    state["camera"] |= {"phase": "measuring", "leds": "on", "line": "measuring", "simulated": True, "address": "usb:77"}
+    state["camera"] |= {"phase": "measuring", "leds": "on", "line": "measuring", "simulated": True, "address": "usb:77", "leds_age_ms": 0}
     state["camera"]["identity"] |= {
         "board": "bench",
         "serial": "77",
@@ -111,11 +130,10 @@ class Told:
         self.page = browser.new_page(viewport={"width": 1200, "height": 960}, timezone_id="UTC")
         given = json.loads(self.page.request.get(f"{address}/api/state").body())
         self.message = message(given)
-        self.sent, self.answer = [], {"json": {}}
+        self.sent, self.answer, self.state_number = [], {"json": {}}, 0
         self.page.add_init_script(IN_PLACE)
         self.page.route("**/api/**", self.asked)
         self.page.goto(address)
-        self.page.wait_for_function("() => streams.length === 1")
         self.tell()
 
     def asked(self, route):
@@ -130,7 +148,19 @@ class Told:
         for part, change in changes.items():
             state = self.message["state"]
             state[part] = state[part] | change if isinstance(change, dict) and state[part] else change
-        self.page.evaluate("message => streams.at(-1).onmessage({ data: message })", json.dumps(self.message))
+        self.state_number += 1
+        self.message["state"]["number"] = self.state_number
+        # The page asks again when it has shown what it was told.
+        self.page.evaluate(
+            """async message => {
+          const until = async is => { while (!is()) await new Promise(done => setTimeout(done, 5)); };
+          await until(() => asks.length);
+          const before = asked;
+          tell(message);
+          await until(() => asked > before);
+        }""",
+            json.dumps(self.message),
+        )
 
     def sends(self, *expected):
         """What the page has sent since the last look."""
@@ -345,10 +375,11 @@ def history(told):
     page.locator("#live").click()
     assert lit() == [4], lit()
     page.evaluate(
-        """message => {
+        """async message => {
       for (let number = 1000; number < 1310; number++) {
         message.state.images.shown = number;
-        streams.at(-1).onmessage({ data: JSON.stringify(message) });
+        while (!asks.length) await new Promise(done => setTimeout(done, 1));
+        tell(JSON.stringify(message));
       }
     }""",
         told.message,
@@ -462,8 +493,9 @@ def lights(told):
         ("stopped", "off", False, "LEDs off, stopped", "start"),
         ("fault", "off", False, "LEDs off, stopped", "resume"),
         ("uncalibrated", "off", False, "LEDs off, stopped", "try-again"),
-        ("lost", "unknown", True, "LEDs unknown: no link to the camera", None),
+        ("lost", "unknown", True, "LEDs unknown, last seen 0 s ago: no answer from the camera", None),
     ]:
+        told.answer = {"json": {"run": False, "command": 50}}
         told.tell(camera={"phase": phase, "leds": leds, "line": f"it is {phase}"}, light={"allowed": allowed})
         told.has("leds", words)
         told.has("line", f"it is {phase}")
@@ -479,7 +511,22 @@ def lights(told):
         for stop in [page.locator("#stop").click, lambda: page.keyboard.press("Escape"), lambda: page.keyboard.press("Space")]:
             stop()
             told.sends(("stop", None))
-            told.tell()
+            # A confirmed stop is not sent again.
+            told.tell(camera={"leds": "off"}, light={"allowed": False, "commands": 50})
+    page.wait_for_timeout(1100)
+    told.sends()
+    expect(page.locator("#alarm")).to_be_hidden()
+    # A stop that the camera does not confirm is said after a second, and sent again; a state from before it confirms nothing.
+    told.answer = {"json": {"run": False, "command": 51}}
+    page.keyboard.press("Escape")
+    told.sends(("stop", None))
+    told.tell()
+    page.wait_for_timeout(1300)
+    expect(page.locator("#alarm")).to_contain_text("The camera has not confirmed that its LEDs are off")
+    told.sends(("stop", None))
+    told.tell(light={"commands": 51})
+    expect(page.locator("#alarm")).to_be_hidden()
+    told.answer = {"json": {}}
     told.tell(camera={"phase": "measuring", "leds": "on", "line": "measuring"}, light={"allowed": True})
 
 
@@ -522,19 +569,23 @@ def scene(told, enters):
 
 
 def stream(browser, address):
-    """What a page does when its stream ends, when the program comes back, and while its tab is hidden."""
+    """What a page does when the program does not answer, when it comes back, and while the tab is hidden."""
     told = Told(browser, address)
     page = told.page
     told.tell(camera={"phase": "stopped", "leds": "off"}, light={"allowed": False})
     expect(page.locator("#start")).to_be_visible()
-    told.answer = {"status": 401, "body": "nirspi needs its token\n"}
-    page.evaluate("streams.at(-1).onerror()")
+    # What the program refuses is said.
+    page.evaluate(
+        """() => { isSilent = true; for (const ask of asks.splice(0)) ask.answer(new Response("nirspi needs its token\\n", { status: 401 })); }"""
+    )
     expect(page.locator("#line")).to_have_text("nirspi needs its token")
-    told.has("leds", "LEDs unknown: no answer from nirspi serve")
+    assert re.fullmatch(r"LEDs unknown, last seen \d s ago: no answer from nirspi serve", page.locator("#leds").inner_text())
     for attribute, value in [("data-phase", "unserved"), ("data-leds", "unknown")]:
         assert page.locator("body").get_attribute(attribute) == value, attribute
     expect(page.locator("#start")).to_be_hidden()
-    page.wait_for_function("() => streams.length === 2")
+    # The page asks again.
+    page.wait_for_function("() => asks.length === 1")
+    page.evaluate("() => { isSilent = false; }")
     told.answer = {"json": {}}
     # The program has started again: its counters begin anew, and its first image has the number of an earlier one.
     told.message["image"] = packed([1000.0 * (at < 512) for at in range(1024)])
@@ -554,21 +605,57 @@ def stream(browser, address):
     page.wait_for_timeout(600)
     told.tell()
     assert page.locator("#losses-plot").get_attribute("aria-label").startswith("frames not received: now 0.0, between 0.0 and 0.0 ")
-    # A hidden page closes its connection, and opens it again when it is shown.
-    for is_hidden, is_open in [(True, [False, False]), (False, [False, False, True])]:
+    silent(told)
+    # A hidden page asks for nothing, and asks again when it is shown.
+    for is_hidden in [True, False]:
         page.evaluate(
             """is => { Object.defineProperty(document, "hidden", { value: is, configurable: true });
           document.dispatchEvent(new Event("visibilitychange")); }""",
             is_hidden,
         )
-        page.wait_for_timeout(1200)
-        assert page.evaluate("streams.map(one => one.isOpen)") == is_open
+        page.wait_for_timeout(300)
+        assert page.evaluate("asks.length") <= (0 if is_hidden else 1)
+        before = page.evaluate("asked")
+        page.wait_for_timeout(1600)
+        assert (page.evaluate("asked") > before) is not is_hidden
     # A command that does not arrive says so too.
     page.route("**/api/settings", lambda route: route.abort())
     page.locator("#sweeps").fill("5")
     page.locator("#sweeps").press("Enter")
     expect(page.locator("body")).to_have_attribute("data-phase", "unserved")
     page.close()
+
+
+def silent(told):
+    """A link on which nothing comes any more, without an end: the page says how old its state is, and believes no old message."""
+    page, leds = told.page, told.page.locator("#leds")
+    told.tell(camera={"phase": "stopped", "leds": "off"}, light={"allowed": False})
+    told.has("leds", "LEDs off, stopped")
+    page.evaluate("() => { isSilent = true; }")
+    page.wait_for_timeout(1500)
+    told.has("leds", "LEDs off, stopped")
+    page.wait_for_timeout(1100)
+    assert re.fullmatch(r"LEDs unknown, last seen \d s ago: no answer from nirspi serve", leds.inner_text()), leds.inner_text()
+    told.has("line", "nirspi serve does not answer; trying again")
+    assert page.locator("body").get_attribute("data-phase") == "unserved"
+    assert re.fullmatch(r"last seen \d s ago", page.locator("#scrub-text").inner_text())
+    assert {row[1] for row in rows(page, "rates")} == {"–"}, rows(page, "rates")
+    expect(page.locator("#start")).to_be_hidden()
+    page.wait_for_timeout(2000)
+    assert re.fullmatch(r"LEDs unknown, last seen \d s ago.*", leds.inner_text()), leds.inner_text()
+    # A message that is old when it comes, as one that waited in a proxy, says nothing of now.
+    page.wait_for_function("() => asks.length")
+    page.evaluate("() => tell(told, 9000)")
+    page.wait_for_timeout(100)
+    assert re.fullmatch(r"LEDs unknown, last seen (9|10) s ago.*", leds.inner_text()), leds.inner_text()
+    # What comes in time holds again, the same image too.
+    page.evaluate("() => { isSilent = false; }")
+    expect(leds).to_have_text("LEDs off, stopped")
+    expect(page.locator("#scrub-text")).to_have_text("live")
+    # The server's own link to the camera is silent.
+    told.tell(camera={"leds": "unknown", "leds_age_ms": 4100})
+    told.has("leds", "LEDs unknown, last seen 4 s ago: no answer from the camera")
+    told.tell(camera={"phase": "measuring", "leds": "on", "leds_age_ms": 0}, light={"allowed": True})
 
 
 PARTS = [facts, pictures, controls, stream]

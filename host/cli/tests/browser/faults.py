@@ -19,6 +19,7 @@ from playwright.sync_api import expect, sync_playwright
 sys.dont_write_bytecode = True
 import by_hand
 import check
+import links
 
 PAGE = pathlib.Path(__file__).parents[3] / "src/serve/page"
 # A part that passes takes less on a busy machine.
@@ -75,7 +76,7 @@ FAULTS = [
     ("the ADC's rate in kS/s is called MS/s", "facts.js", "identity.adc_hz / 1e6", "identity.adc_hz / 1e3", "facts"),
     ("a refusal is not shown", "facts.js", "[answer.refused, state.problem,", "[state.problem,", "controls"),
     ("why there is no image is not shown", "facts.js", "[answer.refused, state.problem,", "[answer.refused,", "facts"),
-    ("events come oldest first", "facts.js", "all.toReversed()", "all", "facts"),
+    ("events come oldest first", "facts.js", "all.slice().reverse()", "all", "facts"),
     (
         "as many other events are not shown",
         "facts.js",
@@ -113,15 +114,15 @@ FAULTS = [
     (
         "a stop that does not arrive is not sent again",
         "light.js",
-        "while (mine === wanted && !await",
-        "if (mine === wanted && !await",
+        "while (mine === stopping && !mine.isDone) {",
+        "if (mine === stopping && !mine.isDone) {",
         "leds",
     ),
     (
         "a page without a program offers to start",
         "light.js",
-        'text($("leds"), `LEDs unknown: ${GONE.leds}`);\n  $("start").hidden = true;',
-        'text($("leds"), `LEDs unknown: ${GONE.leds}`);',
+        'text($("leds"), `LEDs unknown, ${age}: ${GONE.leds}`);\n  $("start").hidden = true;',
+        'text($("leds"), `LEDs unknown, ${age}: ${GONE.leds}`);',
         "stream",
     ),
     (
@@ -132,9 +133,23 @@ FAULTS = [
         "controls",
     ),
     ("a control is set back by a message under way", "requests.js", "touched = performance.now();", "", "controls"),
-    ("a stream that has ended is not opened again", "connection.js", "again = setTimeout(look, 1000); ", "", "stream"),
-    ("the server's reason is not shown", "connection.js", " explain(gone); };", " };", "stream"),
-    ("a hidden page keeps its connection", "connection.js", "if (document.hidden) return;", "", "stream"),
+    ("a page asks no more after an error", "connection.js", "await pause(AGAIN_MS);\n      continue;", "return;", "stream"),
+    ("the server's reason is not shown", "connection.js", "error.refusal ?? GONE.line", "GONE.line", "stream"),
+    ("a hidden page goes on asking", "connection.js", "document.hidden || isHushed()", "isHushed()", "stream"),
+    ("a state has no age", "main.js", "if (!why && age() <= FRESH_MS) return;", "if (!why) return;", "stream"),
+    ("a silent link has no age", "main.js", "if (!why && age() <= FRESH_MS) return;", "if (!why) return;", "silent"),
+    ("an old message counts as new", "connection.js", "asked.map(time => time - age)", "asked", "stream"),
+    ("the rates of a silent program stay", "main.js", "facts.showGone();", "", "stream"),
+    (
+        "the alarm covers the stop button",
+        "style.css",
+        "#alarm { flex-basis: 100%;",
+        "#alarm { position: fixed; top: 0; z-index: 2; width: 100%;",
+        "leds",
+    ),
+    ("a stop that is not confirmed is not said", "light.js", "setTimeout(() => alarm(mine), ALARM_MS);", "", "controls"),
+    ("a state from before a stop confirms it", "light.js", "light.commands >= stopping.command", "true", "controls"),
+    ("every window asks for every image", "connection.js", "if (!isFirst()) await pause(SECOND_WINDOW_MS);", "", "windows"),
     ("the sampling is sent in percent", "controls.js", 'number("sampling") / 100', 'number("sampling")', "controls"),
     (
         "the field of the sampling shows the share",
@@ -225,6 +240,12 @@ class Faulty:
         page.route(re.compile(r"^http://[^/]+/$"), self.serve)
         return page
 
+    def new_context(self):
+        return Faulty(self.browser.new_context(), self.file, self.content)
+
+    def close(self):
+        self.browser.close()
+
     def serve(self, route):
         """With the headers of the program, which keep scripts out of the page."""
         name = route.request.url.rsplit("/", 1)[1] or "index.html"
@@ -240,7 +261,7 @@ def leds(browser, address):
     page.close()
 
 
-PARTS = {part.__name__: part for part in [*by_hand.PARTS, leds, check.fault]}
+PARTS = {part.__name__: part for part in [*by_hand.PARTS, *links.PARTS, leds, check.fault]}
 
 
 def seen(browser, address, part):
@@ -250,7 +271,7 @@ def seen(browser, address, part):
     except Exception as said:
         return next(line for line in str(said).splitlines() if line.strip()) if str(said) else "an assertion"
     finally:
-        for context in browser.browser.contexts:
+        for context in list(browser.browser.contexts):
             context.close()
     return ""
 

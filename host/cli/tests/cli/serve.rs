@@ -158,7 +158,7 @@ fn a_browser_gets_the_page_and_a_script_the_images_of_the_scene() {
         at += 1;
     }
     assert!(files.len() > 8, "{files:?}");
-    assert!(scripts.contains("EventSource(\"/events"));
+    assert!(scripts.contains("./api/next?seen="));
     // The page works without any other network.
     assert!(!(html + scripts.as_str()).contains("://"), "something from elsewhere");
     assert!(page.head.contains("frame-ancestors 'none'"), "{}", page.head);

@@ -59,6 +59,11 @@ export function show(state, drawnPerSecond) {
   events(state.events);
 }
 
+// What holds for the moment alone is not known when there is no state.
+export function showGone() {
+  for (const id of ["rates", "delays"]) for (const value of $(id).querySelectorAll("dd")) text(value, "–");
+}
+
 // p50 and p99 in milliseconds.
 const ms = n => n < 10 ? n.toFixed(1) : whole(Math.round(n));
 const delay = of => of ? `${ms(of.p50_ms)}, ${ms(of.p99_ms)} ms` : "–";
@@ -68,7 +73,7 @@ function events(all) {
   const last = all.at(-1), key = last ? `${all.length} ${last.unix_ms} ${last.text}` : "";
   if (key === told) return;
   told = key;
-  $("events").replaceChildren(...all.toReversed().map(event => {
+  $("events").replaceChildren(...all.slice().reverse().map(event => {
     const item = document.createElement("li"), time = document.createElement("time"), span = document.createElement("span");
     time.textContent = new Date(event.unix_ms).toLocaleTimeString("en-GB");
     span.textContent = foreign(event.text);

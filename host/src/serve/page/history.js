@@ -13,7 +13,7 @@ export const isLive = () => back === 0;
 export const looked = newest => back === 0 ? newest : kept[kept.length - 1 - back] ?? newest;
 
 export function keep(message) {
-  if (!message.image || kept.at(-1)?.state.images.shown === message.state.images.shown) return;
+  if (!message.image || kept.at(-1)?.state.images.shown === message.state.images.shown) return say();
   kept.push({ ...message, at: Date.now() });
   if (kept.length > MOST) kept.shift();
   // The image that is looked at stays the same while newer ones arrive.
@@ -30,6 +30,11 @@ function say() {
   text($("scrub-text"), words);
   $("scrub").setAttribute("aria-valuetext", words);
   document.body.dataset.view = back === 0 ? "live" : "earlier";
+}
+
+// No more images arrive.
+export function showGone(age) {
+  if (back === 0) text($("scrub-text"), age);
 }
 
 function look(wanted) {

@@ -1,35 +1,62 @@
 // The switch of the LEDs: always in reach, by button and by key.
 
+import { words as lastSeen } from "./age.js";
 import { GONE, send } from "./connection.js";
-import { $, text } from "./dom.js";
+import { $, foreign, text } from "./dom.js";
+import { hush, unhush } from "./windows.js";
 
-// A stop that does not arrive is sent again until it arrives. Only a person's start ends that.
-const PATIENCE_MS = 2500, AGAIN_MS = 500;
-let wanted = 0;
+// A stop is sent again until the camera has confirmed that its LEDs are off. Only a person's start ends that.
+const ALARM_MS = 1000, AGAIN_MS = 1000, PATIENCE_MS = 3000;
+const ALARMS = {
+  sent: "The command to switch the LEDs off has not arrived, and is sent again. Cover the lens or unplug the camera: while nirspi "
+    + "serve runs, the LEDs may stay on.",
+  arrived: "The camera has not confirmed that its LEDs are off, and is asked again. Cover the lens or unplug the camera: the LEDs "
+    + "may still be on.",
+};
+// The stop that is under way.
+let stopping = null;
+const pause = ms => new Promise(done => setTimeout(done, ms));
 
 async function command(path) {
   const abort = new AbortController(), late = setTimeout(() => abort.abort(), PATIENCE_MS);
   try {
-    return (await send(path, undefined, { signal: abort.signal, priority: "high" })).ok;
+    return await send(path, undefined, { signal: abort.signal, priority: "high" });
   } catch {
-    return false;
+    return { ok: false };
   } finally {
     clearTimeout(late);
   }
 }
 
 export async function stop() {
-  const mine = ++wanted;
+  const mine = stopping = { command: null, isDone: false };
   text($("leds"), "stopping");
-  while (mine === wanted && !await command("/api/stop")) {
-    if (mine === wanted) $("alarm").hidden = false;
-    await new Promise(done => setTimeout(done, AGAIN_MS));
+  hush();
+  while (mine === stopping && !mine.isDone) {
+    // An answer that is late does not keep the next command.
+    command("/api/stop").then(({ ok, text, isDark }) => {
+      if (!ok || mine !== stopping) return;
+      unhush();
+      if (isDark) finish(mine); else mine.command ??= JSON.parse(text).command;
+    });
+    setTimeout(() => alarm(mine), ALARM_MS);
+    await pause(AGAIN_MS);
   }
-  if (mine === wanted) $("alarm").hidden = true;
+}
+
+function alarm(mine) {
+  if (mine !== stopping || mine.isDone) return;
+  text($("alarm"), ALARMS[mine.command === null ? "sent" : "arrived"]);
+  $("alarm").hidden = false;
+}
+
+function finish(mine) {
+  mine.isDone = true;
+  $("alarm").hidden = true;
 }
 
 export async function start() {
-  wanted++;
+  stopping = null;
   $("alarm").hidden = true;
   await command("/api/start");
 }
@@ -50,6 +77,8 @@ document.addEventListener("click", event => {
   if (event.detail > 0) event.target.closest?.("button, input[type=checkbox], input[type=radio]")?.blur();
 });
 $("stop").onclick = stop;
+// Until this program runs, the button could do nothing.
+$("stop").disabled = false;
 $("start").onclick = $("resume").onclick = $("try-again").onclick = start;
 
 export function show({ camera, light }) {
@@ -58,16 +87,19 @@ export function show({ camera, light }) {
   const words = {
     on: light.allowed ? "LEDs on" : "stopping",
     off: light.allowed ? "LEDs off" : "LEDs off, stopped",
-    unknown: "LEDs unknown: no link to the camera",
+    unknown: `LEDs unknown, ${lastSeen(camera.leds_age_ms)}: no answer from the camera`,
   };
-  text($("leds"), words[leds] ?? leds);
+  text($("leds"), words[leds] ?? foreign(leds));
   // A fault and a missing calibration have buttons of their own.
   $("start").hidden = light.allowed || phase === "fault" || phase === "uncalibrated";
+  // A state from before the command confirms nothing.
+  const isAfter = stopping?.command && light.commands >= stopping.command;
+  if (isAfter && leds === "off" && !light.allowed) finish(stopping);
 }
 
-// The server does not answer.
-export function showGone() {
+// There is no state of the last seconds.
+export function showGone(age) {
   document.body.dataset.leds = "unknown";
-  text($("leds"), `LEDs unknown: ${GONE.leds}`);
+  text($("leds"), `LEDs unknown, ${age}: ${GONE.leds}`);
   $("start").hidden = true;
 }

@@ -1,5 +1,6 @@
 // Connects to the camera's program, and hands each state to the parts of the page.
 
+import { FRESH_MS, since, watch, words } from "./age.js";
 import { GONE, listen } from "./connection.js";
 import * as controls from "./controls.js";
 import * as display from "./display.js";
@@ -13,7 +14,8 @@ import { onGone } from "./requests.js";
 import { download, npy, sheet } from "./save.js";
 import * as scene from "./scene.js";
 
-let newest = null;
+// The newest message, and the moment at which it was true. `why`: what is wrong with the connection.
+let newest = null, at = null, why = "";
 
 // Images may be earlier ones; everything else on the page is of the newest message.
 function showImages() {
@@ -21,8 +23,8 @@ function showImages() {
 }
 history.onLook.call = showImages;
 
-function show(message) {
-  newest = message;
+function show(message, moment) {
+  [newest, at, why] = [message, moment, ""];
   history.keep(message);
   display.count(message);
   const { camera } = message.state;
@@ -41,6 +43,8 @@ function show(message) {
   scene.show(message.state);
   line.show(message.state);
   plots.show(message.state);
+  // An answer may come too late.
+  look();
 }
 
 // What is on the screen is saved, the newest image or an earlier one.
@@ -55,10 +59,21 @@ $("save-npy").onclick = () => {
   if (shown.enhanced) download(npy(display.values(shown.enhanced), 64), "enhanced.npy");
 };
 
-function gone(why = GONE.line) {
+const age = () => at === null ? Infinity : since(at);
+
+// Says that what the page shows is old. A command that was answered is no state.
+function look() {
+  if (!why && age() <= FRESH_MS) return;
   document.body.dataset.phase = "unserved";
-  text($("line"), why);
-  light.showGone();
+  text($("line"), foreign(why || GONE.line));
+  light.showGone(words(age()));
+  facts.showGone();
+  history.showGone(words(age()));
+}
+function gone(line = GONE.line) {
+  why = line;
+  look();
 }
 onGone.call = gone;
+watch(() => { if (at !== null) look(); });
 listen(show, gone);

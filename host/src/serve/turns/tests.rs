@@ -89,7 +89,8 @@ fn watched(page: &mut Turns, turns: usize) -> Vec<(Value, Measurements)> {
         page.camera();
         let Some(look) = page.shared.slot.take_now() else { continue };
         let before = shown(page);
-        let published = page.studio.turn(&page.shared, Some(&look)).unwrap();
+        page.studio.make(&page.shared, &look);
+        let published = lock(&page.studio.told()).state(&page.shared).unwrap();
         if shown(page) > before {
             let message = serde_json::from_str(&published.message).unwrap();
             let Look { sum, run, .. } = look;
