@@ -321,4 +321,9 @@ fn what_is_wrong_with_patterns_of_the_users_own_is_named() {
     write("phi.npy", &[10, 16], &weights);
     let said = run("phi.npy", &["--method", "pseudo-inverse"]).succeeded();
     assert!(said.stdout.contains("rank 9") && said.stdout.contains("1 of 10 patterns"), "{said:?}");
+    // Patterns as pictures are the same patterns.
+    let image = std::fs::read(bench.path("out/image.npy")).unwrap();
+    write("phi.npy", &[10, 4, 4], &weights);
+    run("phi.npy", &["--method", "pseudo-inverse", "--out", "again"]).succeeded();
+    assert_eq!(std::fs::read(bench.path("again/image.npy")).unwrap(), image);
 }

@@ -7,6 +7,9 @@
 //! (`super::tests::all_hadamard_rows_as_a_matrix_give_the_image_by_every_method`), and the second one
 //! eliminates the by far largest singular value. Mean and dark level are those that then fit the
 //! measurements best.
+//!
+//! More measurements than pixels are replaced by as many as there are pixels, with the same sums of
+//! squares for every image ([`solvers::condensed`]), so the time of a method does not grow with them.
 
 use super::solvers::{self, Chosen};
 use super::{DarkLevel, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
@@ -93,11 +96,12 @@ impl Problem {
             true if settings.dark && seen(&shared) => Mean::Shared(shared.mean()),
             _ => Mean::Kept,
         };
-        let norm = solvers::norm(&patterns).max(f64::MIN_POSITIVE);
-        patterns /= norm;
         let spread = (values.norm_squared() / values.len().max(1) as f64).sqrt();
         let spread = if spread > 0.0 { spread } else { 1.0 };
         values /= spread;
+        let (mut patterns, values) = solvers::condensed(patterns, values);
+        let norm = solvers::norm(&patterns).max(f64::MIN_POSITIVE);
+        patterns /= norm;
         let atoms = match &settings.atoms {
             None => Atoms::Basis(Transform::new(settings.basis, own.side)),
             Some(images) => {

@@ -11,6 +11,9 @@ use nalgebra::{DMatrix, DVector};
 /// The most iterations of iterative methods.
 const ITERATIONS: usize = 300;
 
+/// Smallest singular value, relative to the largest, that is told from rounding.
+const SEEN: f64 = 1e-7;
+
 /// Relative change at which an iteration has settled.
 const SETTLED: f64 = 1e-5;
 
@@ -31,6 +34,35 @@ pub(super) fn norm(a: &DMatrix<f64>) -> f64 {
         x = a.tr_mul(&seen);
     }
     1.02 * norm
+}
+
+/// A problem with at most one row more than it has columns, and `abs(y - A x)` as in this one for
+/// every `x`. With `A^T A = V L V^T` its rows are `L^(1/2) V^T`, with the measurements
+/// `L^(-1/2) V^T A^T y`; what no `x` explains of `y` is the measurement of a last row of zeros. A
+/// problem that is not taller stays as it is.
+///
+/// Singular values below [`SEEN`] times the largest are lost.
+pub(super) fn condensed(a: DMatrix<f64>, y: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let columns = a.ncols();
+    let largest = a.amax();
+    if a.nrows() <= columns + 1 || largest == 0.0 {
+        return (a, y);
+    }
+    let relative = &a / largest;
+    let gram = (relative.transpose() * &relative).symmetric_eigen();
+    let seen = gram.eigenvectors.tr_mul(&relative.tr_mul(&y));
+    let least = SEEN * SEEN * gram.eigenvalues.max();
+    let mut rows = DMatrix::zeros(columns + 1, columns);
+    let mut values = DVector::zeros(columns + 1);
+    for (k, &energy) in gram.eigenvalues.iter().enumerate() {
+        if energy > least {
+            let singular = energy.sqrt();
+            rows.row_mut(k).tr_copy_from(&(gram.eigenvectors.column(k) * (singular * largest)));
+            values[k] = seen[k] / singular;
+        }
+    }
+    values[columns] = (y.norm_squared() - values.norm_squared()).max(0.0).sqrt();
+    (rows, values)
 }
 
 /// Least squares with least norm: conjugate gradients from 0 stay in the row space.

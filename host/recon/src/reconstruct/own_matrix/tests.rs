@@ -208,6 +208,27 @@ fn units_of_patterns_and_measurements_do_not_matter() {
     }
 }
 
+/// More patterns than pixels, some of them combinations of others, with measurements that no image
+/// explains.
+#[test]
+fn a_condensed_problem_misses_every_image_by_as_much() {
+    let mut random = Pcg64::seed_from_u64(12);
+    for (count, rank, scale) in [(40, 9, 1e8), (40, 16, 1.0), (17, 16, 1e-8), (18, 1, 1.0)] {
+        let mut draw = |rows, columns| DMatrix::from_fn(rows, columns, |_, _| normal(&mut random));
+        let a = draw(count, rank) * draw(rank, 16) * scale;
+        let y = draw(count, 1).column(0).into_owned();
+        let (small, values) = solvers::condensed(a.clone(), y.clone());
+        assert_eq!(small.shape(), (17, 16));
+        for x in [0.0, 0.3, 10.0].map(|size| draw(16, 1) * size / scale) {
+            let (whole, condensed) = ((&y - &a * &x).norm(), (&values - small.clone() * &x).norm());
+            let case = format!("{count} patterns of rank {rank}");
+            assert!((whole / condensed - 1.0).abs() < 1e-6, "{case}: {whole} and {condensed}");
+        }
+    }
+    let (a, y) = (DMatrix::from_element(17, 16, 1.0), DVector::from_element(17, 1.0));
+    assert_eq!(solvers::condensed(a.clone(), y.clone()), (a, y));
+}
+
 /// Patterns of this kind: 0/1, +-1, grey.
 fn patterns(kind: u8, count: usize, area: usize, seed: u64) -> Vec<f64> {
     let mut random = Pcg64::seed_from_u64(seed);
