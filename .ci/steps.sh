@@ -58,7 +58,7 @@ by_name=(
     "deb             the Debian package; crates.io"
     "release-folder  the folder that nirspi update takes; firmware, seeds"
     "cluster         files and seeds on a Ray cluster of two nodes; PyPI, 700 MB"
-    "python-peers    the Python package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
+    "python-peers    training in Python, and the package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
 
 # Debian packages, where this machine may install them. The lists of a machine that has just begun may name packages
@@ -327,7 +327,9 @@ step_python_peers() {
         deepinv==0.5.0 spyrit==3.1.1 scikit-learn==1.9.1 torch
     # Has wheels for few systems.
     target/python/bin/pip install --quiet spams-bin==2.6.14 || echo "skipped: SPAMS, no wheel"
-    (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/peers)
+    # The training too: it is the only step with torch.
+    cargo build --locked --release
+    (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/peers tests/test_train.py)
 }
 
 step_cluster() {

@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import torch
 import torch.nn.functional as F
-from degrade import REACH_PX, Optics, conditions, disc, psnr, streak
-from networks import FSRCNN, Estimator, UNet
+from nirspi.train.optics import REACH_PX, Optics, conditions, disc, psnr, streak
+from nirspi.train.networks import FSRCNN, Estimator, UNet
 from safetensors.torch import load_file
 
 COUNTS = dict(fnt=60, hnd=60, img=60, nat=30)

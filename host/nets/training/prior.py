@@ -10,7 +10,7 @@ import numpy as np
 import torch
 import torch.nn as nn
 import torch.nn.functional as F
-from networks import Block
+from nirspi.train.networks import Block
 
 ITERATIONS = 20
 ACCURACY = 1e-4

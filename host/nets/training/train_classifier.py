@@ -5,7 +5,7 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 from degrade import Characters
-from networks import Classifier
+from nirspi.train.networks import Classifier
 from safetensors.torch import save_file
 from stepper import Stepper, device_from
 

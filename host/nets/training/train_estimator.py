@@ -3,7 +3,7 @@ import sys
 
 import torch
 from degrade import Characters, held_out
-from networks import Estimator
+from nirspi.train.networks import Estimator
 from safetensors.torch import load_file, save_file
 from stepper import Stepper, device_from
 

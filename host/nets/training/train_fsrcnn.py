@@ -2,8 +2,9 @@
 import sys
 
 import torch
-from degrade import Characters, psnr
-from networks import FSRCNN
+from degrade import Characters
+from nirspi.train.optics import psnr
+from nirspi.train.networks import FSRCNN
 from safetensors.torch import load_file, save_file
 from stepper import Stepper, device_from
 

@@ -12,8 +12,9 @@ import time
 
 import torch
 import torch.nn.functional as F
-from degrade import Characters, conditions, held_out, psnr
-from networks import FSRCNN, Discriminator, Estimator, UNet
+from degrade import Characters, held_out
+from nirspi.train.optics import conditions, psnr
+from nirspi.train.networks import FSRCNN, Discriminator, Estimator, UNet
 from safetensors.torch import load_file, save_file
 from stepper import Stepper, device_from
 

@@ -27,6 +27,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("", "--camera usb", "needs a camera on USB"),
     ("", "--camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
     ("", "nirspi train", "needs the feature train; .ci/run training"),
+    ("", "python -m nirspi.train", "needs PyTorch; .ci/run python-peers"),
     ("boards/electronics/README.md", "run.sh", "needs ngspice; .ci/run electronics"),
     ("boards/mps2-an505/README.md", "install-qemu.sh", "fetches from Debian; .ci/run emulation"),
     ("boards/mps2-an505/README.md", "qemu-system-arm", "needs QEMU and built firmware"),

@@ -2,7 +2,7 @@
 //!
 //! # Invariant
 //! With the same weights each network gives the results of its PyTorch version
-//! (`host/nets/training/networks.py`) to within 1e-4 (`tests::the_unet_gives_what_pytorch_gives`
+//! (`nirspi.train.networks`) to within 1e-4 (`tests::the_unet_gives_what_pytorch_gives`
 //! and its neighbours). Names of parameters are PyTorch's, sizes are read from the weights, and
 //! tensors are N, C, H, W.
 

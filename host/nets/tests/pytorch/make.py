@@ -1,5 +1,5 @@
-"""Makes the fixtures beside it: small networks of the PyTorch twin (host/nets/training/networks.py) with random
-weights, an input and the output of each. Run: python make.py ../../training   (torch, safetensors)"""
+"""Makes the fixtures beside it: small networks of the PyTorch twin (nirspi.train.networks) with random weights, an input and
+the output of each. Run: python make.py ../../training   (nirspi, torch, safetensors)"""
 import hashlib
 import sys
 from pathlib import Path
@@ -9,8 +9,9 @@ import torch
 from safetensors.torch import load_file, save_file
 from torch import nn
 
+import nirspi.train.networks as net
+
 sys.path.insert(0, sys.argv[1])
-import networks as net  # noqa: E402
 import prior  # noqa: E402
 
 HERE = Path(__file__).parent

@@ -1,4 +1,10 @@
-"""The networks of host/nets/src/model in PyTorch, with the same names, so that either loads the other's weights."""
+"""The networks of nirspi in PyTorch. The names of their tensors are those of the weights that nirspi
+reads."""
+
+from __future__ import annotations
+
+import itertools
+
 import torch
 import torch.nn as nn
 import torch.nn.functional as F
@@ -22,7 +28,8 @@ class Block(nn.Module):
 
 
 class UNet(nn.Module):
-    """Deblurrer, 500-step baseline and generator of the GAN. Works on the 32 x 32 grid: 2 x 2 pixels are 4 channels."""
+    """Deblurrer, 500-step baseline and generator of the GAN. Works on the 32 x 32 grid: 2 x 2 pixels are 4
+    channels."""
 
     def __init__(self, widths=(32, 64, 128), blocks=2, embedding=64):
         super().__init__()
@@ -33,7 +40,7 @@ class UNet(nn.Module):
         def level(width):
             return nn.ModuleList([Block(width, embedding) for _ in range(blocks)])
 
-        steps = list(zip(widths, widths[1:]))
+        steps = list(itertools.pairwise(widths))
         self.encoder = nn.ModuleList([level(width) for width in widths])
         self.reduce = nn.ModuleList([nn.Conv2d(fine, coarse, 2, stride=2) for fine, coarse in steps])
         self.expand = nn.ModuleList([nn.Conv2d(coarse, 4 * fine, 1) for fine, coarse in steps])
@@ -60,16 +67,18 @@ class UNet(nn.Module):
 
 
 class Estimator(nn.Module):
-    """Blur and noise of an image of any size: outputs sigma / 4 pixels of its own grid, and 10 times the noise's rms."""
+    """Blur and noise of an image of any size: outputs sigma / 4 pixels of its own grid, and 10 times the
+    noise's rms."""
 
-    def __init__(self):
+    def __init__(self, widths=(16, 32, 48, 64), hidden=64):
         super().__init__()
-        self.conv1 = nn.Conv2d(1, 16, 3, padding=1)
-        self.conv2 = nn.Conv2d(16, 32, 3, 2, 1)
-        self.conv3 = nn.Conv2d(32, 48, 3, 2, 1)
-        self.conv4 = nn.Conv2d(48, 64, 3, 2, 1)
-        self.fc1 = nn.Linear(64, 64)
-        self.fc2 = nn.Linear(64, 2)
+        first, second, third, last = widths
+        self.conv1 = nn.Conv2d(1, first, 3, padding=1)
+        self.conv2 = nn.Conv2d(first, second, 3, 2, 1)
+        self.conv3 = nn.Conv2d(second, third, 3, 2, 1)
+        self.conv4 = nn.Conv2d(third, last, 3, 2, 1)
+        self.fc1 = nn.Linear(last, hidden)
+        self.fc2 = nn.Linear(hidden, 2)
 
     def forward(self, x):
         for conv in (self.conv1, self.conv2, self.conv3, self.conv4):
@@ -97,24 +106,27 @@ class FSRCNN(nn.Module):
 
     def forward(self, x):
         h = self.shrink_act(self.shrink(self.feature_act(self.feature(x))))
-        for conv, act in zip(self.map, self.map_act):
+        for conv, act in zip(self.map, self.map_act, strict=True):
             h = act(conv(h))
-        return F.interpolate(x[:, :1], scale_factor=2, mode="nearest") + self.deconv(self.expand_act(self.expand(h)))
+        return F.interpolate(x[:, :1], scale_factor=2, mode="nearest") + self.deconv(
+            self.expand_act(self.expand(h))
+        )
 
 
 class Classifier(nn.Module):
     """62 characters; its 128 features are what the Frechet character distance compares."""
 
-    LAYERS = [(1, 32, 2), (32, 32, 1), (32, 64, 2), (64, 64, 1), (64, 128, 2), (128, 128, 1)]
-
-    def __init__(self):
+    def __init__(self, widths=(32, 64, 128)):
         super().__init__()
-        for i, (inputs, outputs, stride) in enumerate(self.LAYERS, 1):
-            setattr(self, f"conv{i}", nn.Conv2d(inputs, outputs, 3, stride, 1))
-        self.fc = nn.Linear(128, 62)
+        inputs = 1
+        for i, width in enumerate(widths):
+            setattr(self, f"conv{2 * i + 1}", nn.Conv2d(inputs, width, 3, 2, 1))
+            setattr(self, f"conv{2 * i + 2}", nn.Conv2d(width, width, 3, 1, 1))
+            inputs = width
+        self.fc = nn.Linear(inputs, 62)
 
     def features(self, x):
-        for i in range(1, len(self.LAYERS) + 1):
+        for i in range(1, 7):
             x = F.relu(getattr(self, f"conv{i}")(x))
         return x.mean((2, 3))
 

@@ -1,0 +1,414 @@
+"""python -m nirspi.train: short runs of tiny networks on the processor."""
+
+import io
+import json
+import os
+import signal
+import subprocess
+
+import numpy as np
+import pytest
+from test_train_data import letters, pairs
+
+import nirspi as ns
+from conftest import ROOT
+from nirspi.train import __main__ as command
+
+torch = pytest.importorskip("torch", reason="skipped: no torch (pip install torch)")
+
+from nirspi.train import data, folder, networks  # noqa: E402
+from nirspi.train.optics import conditions  # noqa: E402
+from nirspi.train.run import Run, Settings  # noqa: E402
+from nirspi.train.scenes import Scenes  # noqa: E402
+from nirspi.train.tasks import TASKS  # noqa: E402
+
+DEBLURRERS = ["diffusion", "ancestral", "gan", "regression"]
+WIDTHS = {"fsrcnn": (8, 4), "estimator": (4, 6, 8, 8), "classifier": (6, 8, 12)} | dict.fromkeys(
+    DEBLURRERS, (8, 8)
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def one_thread():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def tiny(network, **changed):
+    small = {
+        "steps": 60,
+        "batch": 4,
+        "average": 0.9,
+        "log_every": 10,
+        "judge_every": 20,
+        "judged": 4,
+        "rate": 4e-3,
+    }
+    return Settings(network=network, width=WIDTHS[network], **small | changed)
+
+
+class Memory:
+    """Keeps a run in memory, each state through its bytes."""
+
+    def __init__(self, stop_at=None):
+        self.state, self.best, self.stop_at, self.run = None, None, stop_at, None
+
+    def keep(self, run, better):
+        file = io.BytesIO()
+        torch.save(run.state(), file)
+        file.seek(0)
+        self.state = torch.load(file, weights_only=True)
+        if better:
+            self.best = {name: tensor.clone() for name, tensor in run.mean.state_dict().items()}
+
+    def train(self, settings, scenes=None, state=None):
+        torch.manual_seed(99)
+        enlarge = networks.FSRCNN(8, 4).requires_grad_(False)
+        self.run = Run(settings, scenes or Scenes([], []), enlarge)
+        if state:
+            self.run.resume(state)
+        return self.run.run(self.keep, stopped=lambda: self.run.step == self.stop_at)
+
+
+def told(run):
+    return [(entry["step"], entry["loss"], entry["held_out"]) for entry in run.log]
+
+
+@pytest.mark.parametrize("network", [name for name in TASKS if name != "classifier"])
+def test_every_network_learns_in_a_short_run(network):
+    kept = Memory()
+    steps = 160 if network == "ancestral" else 60
+    assert kept.train(tiny(network, steps=steps)) == "complete"
+    losses = [entry["loss"] for entry in kept.run.log]
+    assert losses[-1] < 0.9 * losses[0], losses
+    judged = {entry["step"]: entry["held_out"] for entry in kept.run.log if entry["held_out"] is not None}
+    assert list(judged) == list(range(20, steps + 1, 20))
+
+
+@pytest.mark.parametrize("network", ["diffusion", "regression", "gan"])
+def test_a_network_that_knows_the_scene_has_next_to_no_loss_and_the_best_score(network):
+    torch.manual_seed(5)
+    scenes, seen = Scenes([], []), []
+    task = TASKS[network](scenes, (8, 8), networks.FSRCNN(8, 4))
+    task.parts(1e-3)
+    starts = scenes.starts
+
+    def remembered(*args, **options):
+        seen[:] = starts(*args, **options)
+        return seen
+
+    scenes.starts = remembered
+    task.net = lambda current, raw, told: seen[0] - seen[1]
+    # The GAN's generator is judged too: 0.1 of at most 1.
+    assert task.losses(8)["net"] < (0.3 if network == "gan" else 2e-3)
+    assert task.score(task.net, 8) == pytest.approx(110)
+    task.net = lambda current, raw, told: seen[1] - seen[0]
+    assert task.losses(8)["net"] > 0.03 and task.score(task.net, 8) < 50
+
+
+def squares(tmp_path):
+    """Ten pages with a small square or a large one: two classes that are easy to tell apart."""
+    x = np.zeros((10, 64, 64), np.uint8)
+    for i in range(10):
+        half = (4 if i % 2 == 0 else 20) + i // 2
+        x[i, 32 - half : 32 + half, 32 - half : 32 + half] = 255
+    return letters(tmp_path / "squares.npz", x=x, label=np.arange(10) % 2, group=np.arange(10) // 2)
+
+
+def test_a_classifier_learns_classes_and_refuses_scenes_without(tmp_path):
+    stacks = data.read([squares(tmp_path)])
+    kept = Memory()
+    settings = tiny("classifier", steps=240, judge_every=40, rate=1e-2)
+    kept.train(settings, Scenes(stacks, data.split(stacks, 0.2, 1)))
+    assert kept.run.best == 100.0, told(kept.run)
+    with pytest.raises(ns.Error, match="images without labels"):
+        Memory().train(tiny("classifier"))
+
+
+@pytest.mark.parametrize("network", ["diffusion", "gan"])
+def test_a_run_that_was_stopped_goes_on_to_the_very_same_weights(network):
+    settings = tiny(network, steps=24, judge_every=10, log_every=4)
+    whole, first, rest = Memory(), Memory(stop_at=13), Memory()
+    whole.train(settings)
+    assert first.train(settings) == "stopped" and first.run.step == 13
+    assert rest.train(settings, state=first.state) == "complete"
+    assert told(rest.run) == told(whole.run)
+    for a, b in zip(whole.run.mean.parameters(), rest.run.mean.parameters(), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_the_same_seed_gives_the_same_weights_and_another_seed_others():
+    def weights(seed):
+        kept = Memory()
+        kept.train(tiny("fsrcnn", steps=12, judge_every=12, seed=seed))
+        return torch.cat([tensor.flatten() for tensor in kept.best.values()])
+
+    first = weights(1)
+    assert torch.equal(first, weights(1)) and not torch.equal(first, weights(2))
+
+
+def test_a_loss_that_is_no_number_ends_the_run_and_the_last_checkpoint_is_good(monkeypatch):
+    kept, settings = Memory(), tiny("fsrcnn", judge_every=5)
+    losses = TASKS["fsrcnn"].losses
+
+    def breaking(task, count):
+        found = losses(task, count)
+        return {"net": found["net"] * float("nan")} if kept.run.step == 12 else found
+
+    monkeypatch.setattr(TASKS["fsrcnn"], "losses", breaking)
+    with pytest.raises(ns.Error, match="the loss is nan at step 13; .*--resume and a lower --rate"):
+        kept.train(settings)
+    monkeypatch.undo()
+    assert kept.state["step"] == 10
+    again = Memory()
+    assert again.train(settings, state=kept.state) == "complete"
+    assert all(np.isfinite(entry["loss"]) for entry in again.run.log)
+
+
+def test_training_ends_when_held_out_examples_get_no_better():
+    kept = Memory()
+    assert (
+        kept.train(tiny("estimator", rate=1e-12, average=0.0, judge_every=2, patience=3))
+        == "no longer better"
+    )
+    assert kept.run.step == 8
+
+
+@pytest.mark.parametrize(
+    ("wrong", "line"),
+    [
+        ({"batch": 0}, "batch is 0, expected at least 1"),
+        ({"rate": float("nan")}, "rate is nan, expected more than 0 and less than 1"),
+        ({"held_out": 1.0}, "held_out is 1, expected more than 0 and less than 1"),
+        ({"width": (1, 2, 3)}, r"width is \[1, 2, 3\], expected 2 numbers"),
+    ],
+)
+def test_settings_that_cannot_be_are_named(wrong, line):
+    with pytest.raises(ns.Error, match=line):
+        Memory().train(Settings(**vars(tiny("fsrcnn")) | wrong))
+
+
+@pytest.mark.parametrize("network", list(TASKS))
+def test_networks_are_trained_at_the_size_of_the_shipped_ones(network):
+    shipped = ROOT / "host/nets/weights"
+    place = (
+        shipped if network in ("fsrcnn", "diffusion", "estimator", "classifier") else shipped / "baselines"
+    )
+    state = folder.tensors(place / f"{network}.safetensors")
+    net = TASKS[network].network(None, TASKS[network].widths)
+    assert {name: tensor.shape for name, tensor in net.state_dict().items()} == {
+        name: t.shape for name, t in state.items()
+    }
+    net.load_state_dict(state)
+
+
+@pytest.mark.parametrize(
+    ("name", "net"),
+    [
+        ("unet", lambda: networks.UNet((8, 12, 16), 2, 8)),
+        ("fsrcnn", lambda: networks.FSRCNN(8, 5, 3)),
+        ("estimator", lambda: networks.Estimator((4, 6, 8, 10), hidden=7)),
+        ("classifier", lambda: networks.Classifier((4, 6, 8))),
+    ],
+)
+def test_networks_give_the_numbers_that_the_program_is_tested_with(name, net):
+    at = ROOT / "host/nets/tests/pytorch"
+    net, pairs = net(), folder.tensors(at / f"{name}_reference.safetensors")
+    net.load_state_dict(folder.tensors(at / f"{name}.safetensors"))
+    inputs = [pairs[key] for key in sorted(pairs) if key.startswith("in")]
+    with torch.no_grad():
+        found = net(*inputs)
+    assert (found - pairs[max(key for key in pairs if key.startswith("out"))]).abs().max() < 1e-5
+
+
+def run(tmp_path, *more, network="fsrcnn", width="4,2"):
+    small = ["--width", width, "--batch", "2", "--judge-every", "4", "--judged", "4", "--device", "cpu"]
+    return command.main([network, "--out", str(tmp_path / "run"), *small, *map(str, more)])
+
+
+def steps(tmp_path):
+    lines = (tmp_path / "run/log.jsonl").read_text().splitlines()
+    return [json.loads(line)["step"] for line in lines]
+
+
+def test_a_run_is_kept_in_its_folder_and_gone_on_with_and_not_overwritten(tmp_path, capsys):
+    assert run(tmp_path, "--steps", 8, "--json") == 0
+    report = json.loads(capsys.readouterr().out)
+    assert (report["step"], report["ended"]) == (8, "complete")
+    assert sorted(os.listdir(tmp_path / "run")) == [
+        "checkpoint.pt",
+        "data.json",
+        "log.jsonl",
+        "weights.safetensors",
+    ]
+    assert steps(tmp_path) == [4, 8]
+    assert run(tmp_path, "--steps", 8) == 1
+    assert "a run is kept there, expected --resume" in capsys.readouterr().err
+    assert run(tmp_path, "--steps", 12, "--resume") == 0
+    assert steps(tmp_path) == [4, 8, 12]
+    assert run(tmp_path, "--steps", 12, "--resume", "--seed", 2) == 1
+    assert (
+        "checkpoint: another seed, expected the same settings but steps and rate" in capsys.readouterr().err
+    )
+
+
+def test_a_checkpoint_with_a_wrong_bit_is_refused(tmp_path, capsys):
+    assert run(tmp_path, "--steps", 4) == 0
+    path = tmp_path / "run/checkpoint.pt"
+    good = path.read_bytes()
+    for bad in (good[:-1], good[:100] + bytes([good[100] ^ 1]) + good[101:], b""):
+        path.write_bytes(bad)
+        assert run(tmp_path, "--steps", 8, "--resume") == 1
+        assert "damaged or cut short" in capsys.readouterr().err
+    path.write_bytes(good)
+    assert run(tmp_path, "--steps", 8, "--resume") == 0
+
+
+def test_data_and_pairs_are_trained_on_and_told_and_other_data_are_another_run(tmp_path, capsys):
+    a = letters(tmp_path / "a.npz")
+    made = pairs(tmp_path / "pairs.npz", [0] * 12, np.arange(12) % 6)
+    assert run(tmp_path, "--data", a, "--pairs", made, "--camera-share", 1, "--steps", 4) == 0
+    (stack,) = json.loads((tmp_path / "run/data.json").read_text())["stacks"]
+    assert stack["name"] == "a" and stack["held_out_images"] == 4 and len(stack["held_out"]) == 1
+    other = letters(tmp_path / "b.npz", seed=9)
+    assert run(tmp_path, "--data", other, "--camera-share", 1, "--steps", 8, "--resume") == 1
+    assert "checkpoint: another data" in capsys.readouterr().err
+
+
+def test_examples_come_from_the_pairs_in_their_share(tmp_path):
+    read = data.pairs([pairs(tmp_path / "p.npz", [-1] * 3, [-1] * 3)], [], [])
+    known = {image.tobytes() for image in read["y"]}
+
+    def virtual(share, held=False):
+        batch = Scenes([], [], read, camera_share=share).readings(40, held)
+        return sum(image.numpy().tobytes() in known for image in batch.y[:, 0])
+
+    assert (virtual(0.0), virtual(1.0), virtual(1.0, held=True)) == (0, 40, 0)
+
+
+def test_training_draws_from_no_held_out_image_the_other_way_round_and_from_each_stack_alike(tmp_path):
+    stacks = data.read([letters(tmp_path / "a.npz"), letters(tmp_path / "b.npz", groups=40, seed=4)])
+    masks = data.split(stacks, 0.2, 1)
+    scenes = Scenes(stacks, masks)
+    torch.manual_seed(5)
+    for held in (False, True):
+        stack, at = scenes.indices(4000, held)
+        for i, mask in enumerate(masks):
+            assert set(at[stack == i].tolist()) == set(np.flatnonzero(mask == held).tolist())
+            assert 1800 < (stack == i).sum() < 2200
+    x, _ = scenes.draw(50, held=True)
+    shown = {
+        image.tobytes() for stack, mask in zip(stacks, masks, strict=True) for image in stack.images[mask]
+    }
+    assert all((image * 255).round().to(torch.uint8).numpy().tobytes() in shown for image in x[:, 0])
+
+
+def test_the_rate_rises_then_falls():
+    run = Run(tiny("fsrcnn", steps=1000), Scenes([], []))
+    rates = []
+    for step in (0, 99, 199, 500, 999):
+        run.step = step
+        rates.append(run.rate())
+    assert rates[0] == pytest.approx(0.005, rel=1e-3) and rates[1] == pytest.approx(0.5, rel=0.05)
+    assert max(rates) == rates[2] > rates[3] == pytest.approx(0.5) and rates[4] < 1e-4
+
+
+def test_a_zone_of_a_pair_without_depth_is_zero_and_marked(tmp_path):
+    read = data.pairs([pairs(tmp_path / "p.npz", [-1], [-1])], [], [])
+    read["depth_m"][0] = 1.5
+    read["depth_m"][0, 2, 3] = 0
+    metres, valid = Scenes([], [], read, camera_share=1.0).readings(1).depth[0]
+    lost = torch.zeros(32, 32, dtype=torch.bool)
+    lost[8:12, 12:16] = True
+    assert torch.equal(valid == 0, lost) and torch.equal(metres == 0, lost)
+    assert set(metres[~lost].tolist()) == {0.5} and set(valid[~lost].tolist()) == {1.0}
+
+
+def test_raw_is_the_reading_four_times_or_the_image_itself():
+    scenes, drawn = Scenes([], []), []
+    degrade = scenes.degrade
+
+    def remembered(x, sampled):
+        drawn.append(degrade(x, sampled)[0])
+        return drawn[-1], *degrade(x, sampled)[1:]
+
+    scenes.degrade = remembered
+    torch.manual_seed(5)
+    x, start, raw, sigma, noise = scenes.starts(8, networks.FSRCNN(8, 4))
+    readings, images = drawn
+    assert len(readings) == 6 and torch.equal(raw[:6, :, 1::2, ::2], readings)
+    assert torch.equal(raw[6:], images) and torch.equal(start[6:], images)
+    assert [len(part) for part in (x, start, raw, sigma, noise)] == [8] * 5
+
+
+def test_what_cannot_be_trained_is_named_and_leaves_nothing(tmp_path, capsys):
+    def refused(*more, **other):
+        assert run(tmp_path, *more, **other) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    assert "no checkpoint to go on from" in refused("--resume")
+    assert "none.npz: cannot read it" in refused("--data", "none.npz")
+    assert "rate is 7, expected more than 0 and less than 1" in refused("--rate", 7)
+    assert "images without labels" in refused(network="classifier", width="4,4,4")
+    assert "diffusion needs --fsrcnn FILE" in refused(network="diffusion")
+    assert "no weights, expected a file of safetensors" in refused("--fsrcnn", __file__, network="diffusion")
+    assert "--device abacus: " in refused("--device", "abacus")
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(SystemExit):
+        command.main(["fsrcnn"])
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_control_c_keeps_the_run_which_then_goes_on(tmp_path, monkeypatch):
+    once = Run.once
+
+    def interrupted(self):
+        if self.step == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+        return once(self)
+
+    monkeypatch.setattr(Run, "once", interrupted)
+    assert run(tmp_path, "--steps", 12) == 0
+    state = folder.Folder(tmp_path / "run").load("cpu")
+    assert 6 <= state["step"] < 12
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    monkeypatch.undo()
+    assert run(tmp_path, "--steps", 12, "--resume") == 0
+    assert steps(tmp_path) == [4, 8, 12]
+
+
+def test_the_program_computes_with_the_weights_of_a_run_what_pytorch_does(tmp_path, cli):
+    first = tmp_path / "first"
+    assert run(first, "--steps", 4) == 0
+    told = ["--fsrcnn", first / "run/weights.safetensors", "--rate", 0.01]
+    assert run(tmp_path, "--steps", 8, *told, network="regression", width="8,12") == 0
+    weights = tmp_path / "run/weights.safetensors"
+    net = networks.UNet((8, 12))
+    net.load_state_dict(folder.tensors(weights))
+    image = np.zeros((64, 64), np.float32)
+    image[12:50, 20:30] = 0.6
+    image[30:44, 24:58] = 0.9
+    np.save(tmp_path / "in.npy", image)
+    options = [
+        "--blur-px",
+        "2",
+        "--noise",
+        "0.03",
+        "--no-consistency",
+        "--backend",
+        "cpu",
+        "--weights",
+        weights,
+    ]
+    command_line = [cli, "deblur", "in.npy", "--model", "regression", *options, "--out", "out.npy"]
+    subprocess.run(command_line, cwd=tmp_path, check=True, capture_output=True)
+    x = torch.from_numpy(image)[None, None]
+    with torch.no_grad():
+        told = conditions(torch.ones(1), torch.tensor([2.0]), torch.tensor([0.03]))
+        expected = (x + net(x, x, told)).clamp(0, 1)[0, 0].numpy()
+    found = np.load(tmp_path / "out.npy").reshape(64, 64)
+    assert np.abs(expected - image).max() > 0.01
+    assert np.abs(found - expected).max() < 1e-4
