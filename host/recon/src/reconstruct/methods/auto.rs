@@ -33,9 +33,9 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     prepare: |settings| Ok(Box::new(Auto::new(settings)?)),
 });
 
-/// The most that the learned prior's [`merit`] counts more than another method's. It counts as much
-/// more as there are more patterns than were shown, since so much more lies beyond them: not at all
-/// where all were shown, twice at a half.
+/// The most that the learned prior's [`merit`] counts more than another method's. It counts as many
+/// times as patterns were left out for each one that was shown, since so much lies beyond these:
+/// once at a half or more of the patterns, three times at a quarter.
 const MOST_LEAD: f64 = 4.0;
 
 /// The least merit with which another method takes the prior's place where patterns were left out:
@@ -74,8 +74,9 @@ impl Auto {
         let mut best: Option<(f64, usize, Reconstruction)> = None;
         let takes = |network: &SharedNetwork| network.get().takes(measurements.side());
         let with_network = self.network.as_ref().is_some_and(takes);
-        let lead = measurements.side().area() as f64 / measurements.rows().len() as f64;
-        let (left_out, lead) = (lead > 1.0, lead.min(MOST_LEAD));
+        let (all, shown) = (measurements.side().area(), measurements.rows().len());
+        let left_out = all > shown;
+        let lead = ((all - shown) as f64 / shown as f64).clamp(1.0, MOST_LEAD);
         let noise_alone = is_noise_alone(measurements);
         for (at, (word, method)) in self.candidates.iter().enumerate() {
             if (*word == Method::PRIOR && !with_network)
