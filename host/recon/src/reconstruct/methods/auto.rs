@@ -6,9 +6,9 @@
 //! the one that predicts most of them makes the picture, with two exceptions that
 //! `host/eval/tests/defaults/table.md` has the figures for:
 //!
-//! - Where patterns were left out, readings tell how well a method predicts between the patterns
-//!   that were shown, and not beyond them. A learned prior loses less beyond them than the others,
-//!   so another method must do clearly better there ([`MOST_LEAD`]).
+//! - Readings tell how well a method predicts between the patterns that were shown, and not beyond
+//!   them. A learned prior loses less beyond them than the others, so another method must do clearly
+//!   better where more patterns were left out than shown ([`MOST_LEAD`]).
 //! - Readings that hold nothing but noise choose by chance, so Tikhonov's method, which gives an
 //!   even picture of them, is taken.
 
