@@ -220,7 +220,8 @@ async fn next_state(State(app): State<App>, uri: Uri) -> Response {
         pairs.find_map(|pair| pair.strip_prefix(name)?.strip_prefix('=')?.parse::<u64>().ok())
     };
     let seen = given("seen");
-    let is_new = |moment: &Arc<Published>| !moment.message.is_empty() && Some(moment.number) != seen;
+    let is_new =
+        |moment: &Arc<Published>| !moment.message.is_empty() && Some(moment.number) != seen;
     // What there is after a second is the answer, and so it is when the server stops.
     let _ = tokio::time::timeout(PATIENCE, published.wait_for(is_new)).await;
     let moment = Arc::clone(&published.borrow());

@@ -375,8 +375,11 @@ fn a_page_that_asks_gets_each_state_once_with_its_age_and_waits_for_the_next() {
         let mut stream = TcpStream::connect(paper.address).unwrap();
         stream.set_read_timeout(Some(LIMIT)).unwrap();
         let host = paper.address;
-        write!(stream, "GET /api/next{query} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n")
-            .unwrap();
+        write!(
+            stream,
+            "GET /api/next{query} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n"
+        )
+        .unwrap();
         let began = Instant::now();
         let answer = io::read_to_string(stream).unwrap();
         let (head, body) = answer.split_once("\r\n\r\n").unwrap();
