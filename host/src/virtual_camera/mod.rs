@@ -100,7 +100,7 @@ impl PacketsOut {
         self.bytes.get(self.sent..self.committed).unwrap_or(&[])
     }
 
-    /// Whether there is no room for [`SPARE_FRAMES`] more.
+    /// Whether there is no room for 8 more frames.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.waiting().len() + SPARE_FRAMES * FRAME_BYTES > PACKETS_BYTES

@@ -76,7 +76,7 @@ fn files_of_another_kind_are_refused() {
     refused(&bench, "empty.mcap", b"", &["nirspi recording"]);
     refused(&bench, "text.mcap", b"hello, world, this is no recording", &["another kind"]);
     bench.run(&["reconstruct", "none.npz"]).failed(1, &["none.npz", "no such file"]);
-    bench.run(&["reconstruct", "."]).failed(2, &["the table of the folder ."]);
+    bench.run(&["reconstruct", "."]).failed(1, &["none of 4 files gave an image", "./empty.mcap"]);
 }
 
 #[test]
