@@ -40,7 +40,7 @@ fn a_client_in_the_network_gets_nothing_without_the_token() {
     assert_eq!(first.status, 303, "{first:?}");
     let head = first.head.to_lowercase();
     assert!(
-        head.contains("location: /\r\n") && head.contains("httponly; samesite=strict"),
+        head.contains("location: ./\r\n") && head.contains("httponly; samesite=strict"),
         "{head}"
     );
     // The token does not open the door for pages of other sites.
