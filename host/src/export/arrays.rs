@@ -81,9 +81,9 @@ fn frames(whole: &Whole, out: &Path, to: &mut impl Write) -> Result<(), ExportEr
     let shape = [whole.frames(), whole.source.measurements.rows().len()];
     write(to, &header::<f64>(&shape))?;
     let mut bytes = Vec::new();
-    whole.each(|frame| {
+    whole.each(|_, measurements| {
         bytes.clear();
-        frame.measurements.values().iter().for_each(|value| value.append(&mut bytes));
+        measurements.values().iter().for_each(|value| value.append(&mut bytes));
         Ok(write(to, &bytes)?)
     })
 }

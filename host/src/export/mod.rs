@@ -265,13 +265,6 @@ struct Whole {
     time_ns: Vec<i64>,
 }
 
-/// One frame of a recording.
-struct OneFrame {
-    /// Number of the frame in the recording.
-    index: usize,
-    measurements: Measurements,
-}
-
 impl Whole {
     /// Reads a recording.
     fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
@@ -305,10 +298,10 @@ impl Whole {
         self.source.taken.simulated() == Some(true)
     }
 
-    /// Reads the frames one by one.
+    /// Reads the frames one by one: the number of the frame in the recording, and its measurements.
     fn each(
         &self,
-        mut on: impl FnMut(&OneFrame) -> Result<(), ExportError>,
+        mut on: impl FnMut(usize, &Measurements) -> Result<(), ExportError>,
     ) -> Result<(), ExportError> {
         let mut recording = Recording::open(&self.path)?;
         let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
@@ -321,7 +314,7 @@ impl Whole {
             let measurements = alone(frame, &setup)
                 .measurements(&setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
-            on(&OneFrame { index, measurements })?;
+            on(index, &measurements)?;
             index += 1;
             Ok(())
         })?;

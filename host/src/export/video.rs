@@ -62,11 +62,11 @@ pub(super) fn apng(
     let method = Method::default().prepare(&super::settings()).map_err(problem(0))?;
     let method = Stacked::new(method);
     let mut images: Vec<Image> = Vec::new();
-    whole.each(|frame| {
-        if let Some(mean) = groups.add(frame.measurements.values()) {
-            let mean = Measurements::from_differential(frame.measurements.rows(), &mean)
+    whole.each(|index, measurements| {
+        if let Some(mean) = groups.add(measurements.values()) {
+            let mean = Measurements::from_differential(measurements.rows(), &mean)
                 .map_err(|problem| whole.integrate(problem.into()))?;
-            let made = method.reconstruct(&mean).map_err(problem(frame.index))?;
+            let made = method.reconstruct(&mean).map_err(problem(index))?;
             images.push(whole.source.flattened(made.image));
         }
         Ok(())
