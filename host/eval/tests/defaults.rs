@@ -10,6 +10,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
 
+#[path = "../examples/natural/mod.rs"]
+mod natural;
 #[path = "defaults/scenes.rs"]
 mod scenes;
 
@@ -108,19 +110,30 @@ fn stale(committed: &str, measured: &[Row]) -> Vec<String> {
     measured.iter().filter_map(of).collect()
 }
 
+/// Lines of the rows in which a method is better than the default by more than this many times what the table allows.
+fn lost(rows: &[Row], times: f64) -> Vec<String> {
+    let lost = rows.iter().filter(|row| row.lost() > times * row.unit.most_lost());
+    lost.map(|row| format!("{} by {:.3}", row.line(), row.lost())).collect()
+}
+
 #[test]
 #[ignore = "a minute; .ci/run does it"]
 fn no_method_is_better_than_the_default_by_a_decibel() {
-    let kinds = scenes::all();
-    let measured = rows(&kinds);
+    let measured = rows(&scenes::of_the_table());
     let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/defaults/table.md");
     if std::env::var_os("NIRSPI_BLESS").is_some() {
         std::fs::write(&file, page(&measured)).unwrap();
     }
-    let worse = measured.iter().filter(|row| row.lost() > row.unit.most_lost());
-    let worse: Vec<String> =
-        worse.map(|row| format!("{} by {:.3}", row.line(), row.lost())).collect();
-    assert!(worse.is_empty(), "a method is better than the default:\n{}", worse.join("\n"));
+    let lost = lost(&measured, 1.0);
+    assert!(lost.is_empty(), "a method is better than the default:\n{}", lost.join("\n"));
     let stale = stale(&std::fs::read_to_string(&file).unwrap(), &measured);
     assert!(stale.is_empty(), "NIRSPI_BLESS=1 writes the table anew:\n{}", stale.join("\n"));
+}
+
+/// The rule of the default was made with the scenes of the table. Of words from a half of the patterns 1.01 dB were seen lost.
+#[test]
+#[ignore = "a minute; .ci/run does it"]
+fn the_default_loses_little_on_scenes_that_its_rule_was_not_made_with() {
+    let lost = lost(&rows(&scenes::others()), 1.1);
+    assert!(lost.is_empty(), "a method is better than the default:\n{}", lost.join("\n"));
 }
