@@ -324,7 +324,7 @@ step_python() {
 
 step_python_peers() {
     python_package numpy ipykernel==7.4.0 matplotlib nbclient==0.11.0 pyarrow pytest==9.2.0 scipy \
-        deepinv==0.5.0 spyrit==3.1.1 scikit-learn==1.9.1 torch
+        deepinv==0.5.0 spyrit==3.1.1 scikit-learn==1.9.1 torch safetensors
     # Has wheels for few systems.
     target/python/bin/pip install --quiet spams-bin==2.6.14 || echo "skipped: SPAMS, no wheel"
     # The training too: it is the only step with torch.

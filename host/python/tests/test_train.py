@@ -11,6 +11,7 @@ import pytest
 from test_train_data import letters, pairs
 
 import nirspi as ns
+import nirspi.train
 from conftest import ROOT
 from nirspi.train import __main__ as command
 
@@ -22,7 +23,7 @@ from nirspi.train.run import Run, Settings  # noqa: E402
 from nirspi.train.scenes import Scenes  # noqa: E402
 from nirspi.train.tasks import TASKS  # noqa: E402
 
-DEBLURRERS = ["diffusion", "ancestral", "gan", "regression"]
+DEBLURRERS = [name for name, task in TASKS.items() if task.enlarges]
 WIDTHS = {"fsrcnn": (8, 4), "estimator": (4, 6, 8, 8), "classifier": (6, 8, 12)} | dict.fromkeys(
     DEBLURRERS, (8, 8)
 )
@@ -158,7 +159,7 @@ def test_a_loss_that_is_no_number_ends_the_run_and_the_last_checkpoint_is_good(m
         return {"net": found["net"] * float("nan")} if kept.run.step == 12 else found
 
     monkeypatch.setattr(TASKS["fsrcnn"], "losses", breaking)
-    with pytest.raises(ns.Error, match="the loss is nan at step 13; .*--resume and a lower --rate"):
+    with pytest.raises(ns.Error, match="the loss is nan at step 13: .*resume it with a lower rate"):
         kept.train(settings)
     monkeypatch.undo()
     assert kept.state["step"] == 10
@@ -245,13 +246,26 @@ def test_a_run_is_kept_in_its_folder_and_gone_on_with_and_not_overwritten(tmp_pa
     ]
     assert steps(tmp_path) == [4, 8]
     assert run(tmp_path, "--steps", 8) == 1
-    assert "a run is kept there, expected --resume" in capsys.readouterr().err
+    assert "a run is kept there, expected to resume it" in capsys.readouterr().err
     assert run(tmp_path, "--steps", 12, "--resume") == 0
     assert steps(tmp_path) == [4, 8, 12]
     assert run(tmp_path, "--steps", 12, "--resume", "--seed", 2) == 1
     assert (
         "checkpoint: another seed, expected the same settings but steps and rate" in capsys.readouterr().err
     )
+
+
+def test_a_program_trains_as_the_command_does(tmp_path):
+    assert run(tmp_path, "--steps", 8, "--seed", 4) == 0
+    heard = []
+    settings = {"steps": 8, "seed": 4, "width": (4, 2), "batch": 2, "judge_every": 4, "judged": 4}
+    report = nirspi.train.train("fsrcnn", tmp_path / "own", device="cpu", told=heard.append, **settings)
+    assert (report["step"], report["ended"], [entry["step"] for entry in heard]) == (8, "complete", [4, 8])
+    weights = [folder.tensors(tmp_path / name / "weights.safetensors") for name in ("run", "own")]
+    assert all(torch.equal(tensor, weights[1][name]) for name, tensor in weights[0].items())
+    with pytest.raises(ns.Error, match="network is pix2pix, expected one of fsrcnn, "):
+        nirspi.train.train("pix2pix", tmp_path / "none")
+    assert tuple(TASKS) == nirspi.train.NETWORKS
 
 
 def test_a_checkpoint_with_a_wrong_bit_is_refused(tmp_path, capsys):
@@ -349,13 +363,13 @@ def test_what_cannot_be_trained_is_named_and_leaves_nothing(tmp_path, capsys):
         (line,) = capsys.readouterr().err.splitlines()
         return line
 
-    assert "no checkpoint to go on from" in refused("--resume")
+    assert "no checkpoint to resume" in refused("--resume")
     assert "none.npz: cannot read it" in refused("--data", "none.npz")
     assert "rate is 7, expected more than 0 and less than 1" in refused("--rate", 7)
     assert "images without labels" in refused(network="classifier", width="4,4,4")
-    assert "diffusion needs --fsrcnn FILE" in refused(network="diffusion")
+    assert "diffusion needs the weights of an fsrcnn" in refused(network="diffusion")
     assert "no weights, expected a file of safetensors" in refused("--fsrcnn", __file__, network="diffusion")
-    assert "--device abacus: " in refused("--device", "abacus")
+    assert "device abacus: " in refused("--device", "abacus")
     assert not (tmp_path / "run").exists()
     with pytest.raises(SystemExit):
         command.main(["fsrcnn"])

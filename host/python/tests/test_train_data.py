@@ -130,6 +130,6 @@ def test_without_torch_the_command_says_what_to_install(monkeypatch, capsys, tmp
     assert command.main(["fsrcnn", "--out", str(tmp_path / "run")]) == 1
     assert (
         capsys.readouterr().err
-        == "error: training needs PyTorch, which is not installed: pip install torch\n"
+        == "error: training needs PyTorch and safetensors: pip install torch safetensors\n"
     )
     assert not (tmp_path / "run").exists()

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
 
 from .._nirspi import Error
 
-DTYPES = {"F16": torch.float16, "F32": torch.float32}
 SHA_BYTES = 32
 
 
@@ -40,37 +41,19 @@ def _read(path: Path) -> bytes:
 
 def weights(state: dict[str, torch.Tensor], about: dict[str, str]) -> bytes:
     """A file of safetensors in single precision, with a checksum of all that stands behind its header."""
-    header: dict[str, Any] = {}
-    parts, at = [], 0
-    for name, tensor in state.items():
-        data = tensor.detach().float().contiguous().cpu().numpy().astype("<f4").tobytes()
-        header[name] = {"dtype": "F32", "shape": list(tensor.shape), "data_offsets": [at, at + len(data)]}
-        parts.append(data)
-        at += len(data)
-    body = b"".join(parts)
-    header["__metadata__"] = about | {"sha256": hashlib.sha256(body).hexdigest()}
-    text = json.dumps(header).encode()
-    text += b" " * (-len(text) % 8)
-    return len(text).to_bytes(8, "little") + text + body
+    parts = {name: tensor.detach().float().contiguous().cpu() for name, tensor in state.items()}
+    bare = save(parts)
+    body = bare[8 + int.from_bytes(bare[:8], "little") :]
+    return save(parts, about | {"sha256": hashlib.sha256(body).hexdigest()})
 
 
 def tensors(path: Path) -> dict[str, torch.Tensor]:
-    """The tensors of a file of safetensors in half or single precision."""
+    """The tensors of a file of safetensors, in single precision."""
     data = _read(path)
     try:
-        length = int.from_bytes(data[:8], "little")
-        header = json.loads(data[8 : 8 + length])
-        header.pop("__metadata__", None)
-        body, found = bytearray(data[8 + length :]), {}
-        for name, about in header.items():
-            begin, end = about["data_offsets"]
-            flat = torch.frombuffer(body[begin:end], dtype=DTYPES[about["dtype"]])
-            found[name] = flat.reshape(about["shape"]).float()
-        return found
-    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError):
-        raise Error(
-            f"{path}: no weights, expected a file of safetensors in half or single precision"
-        ) from None
+        return {name: tensor.float() for name, tensor in load(data).items()}
+    except (SafetensorError, KeyError):
+        raise Error(f"{path}: no weights, expected a file of safetensors") from None
 
 
 class Folder:
@@ -83,7 +66,7 @@ class Folder:
     def begin(self, resume: bool, held_out: dict[str, Any]) -> None:
         """Makes the folder. Refuses to begin where a run is kept."""
         if self.checkpoint.exists() and not resume:
-            raise Error(f"{self.path}: a run is kept there, expected --resume or another --out")
+            raise Error(f"{self.path}: a run is kept there, expected to resume it, or another folder")
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -93,7 +76,7 @@ class Folder:
     def load(self, device: str) -> dict[str, Any]:
         """The state that was kept last."""
         if not self.checkpoint.exists():
-            raise Error(f"{self.path}: no checkpoint to go on from, expected a run without --resume first")
+            raise Error(f"{self.path}: no checkpoint to resume")
         data = _read(self.checkpoint)
         if hashlib.sha256(data[SHA_BYTES:]).digest() != data[:SHA_BYTES]:
             raise Error(

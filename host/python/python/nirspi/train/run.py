@@ -12,61 +12,18 @@ import copy
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import torch
 
 from .._nirspi import Error
+from .settings import Settings
 from .tasks import TASKS
 
 WARM_UP_STEPS = 200
 # Seeds of held-out examples and of first weights; steps have their own numbers.
 HELD_OUT, FIRST = -1, -2
-
-
-@dataclass(frozen=True)
-class Settings:
-    """A run's settings, on which its result depends; `data` is the digest of what it learns from."""
-
-    network: str
-    steps: int
-    rate: float
-    width: tuple[int, ...] = ()
-    batch: int = 16
-    seed: int = 1
-    average: float = 0.999
-    log_every: int = 50
-    judge_every: int = 500
-    judged: int = 96
-    patience: int = 12
-    shapes: float = 0.15
-    camera_share: float = 0.2
-    held_out: float = 0.1
-    data: str = ""
-
-    def check(self):
-        """Refuses what is outside its range."""
-        for name in ("steps", "batch", "log_every", "judge_every", "judged", "patience"):
-            if getattr(self, name) < 1:
-                raise Error(f"{name} is {getattr(self, name)}, expected at least 1")
-        if not 0 < self.rate < 1:
-            raise Error(f"rate is {self.rate:g}, expected more than 0 and less than 1")
-        if not 0 <= self.average < 1:
-            raise Error(f"average is {self.average:g}, expected 0 to less than 1")
-        for name in ("shapes", "camera_share"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise Error(f"{name} is {getattr(self, name):g}, expected 0 to 1")
-        if not 0 < self.held_out < 1:
-            raise Error(f"held_out is {self.held_out:g}, expected more than 0 and less than 1")
-        TASKS[self.network].refuse(self.width)
-
-    def same_run(self, other: dict[str, Any]) -> list[str]:
-        """Names of what differs and would make another run of it."""
-        own = {
-            name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()
-        }
-        return [name for name in own if name not in ("steps", "rate") and own[name] != other.get(name)]
 
 
 def seeded(seed: int, number: int) -> None:
@@ -78,6 +35,7 @@ class Run:
 
     def __init__(self, settings: Settings, scenes, enlarge=None):
         settings.check()
+        TASKS[settings.network].refuse(settings.width)
         self.settings = settings
         seeded(settings.seed, FIRST)
         self.task = TASKS[settings.network](scenes, settings.width, enlarge)
@@ -138,8 +96,10 @@ class Run:
         while self.step < settings.steps:
             loss = self.once()
             if not math.isfinite(loss):
-                last = "what was kept last is good: go on from it with --resume and a lower --rate"
-                raise Error(f"the loss is {loss} at step {self.step}; {last}")
+                raise Error(
+                    f"the loss is {loss} at step {self.step}: the last checkpoint is valid, resume it with a"
+                    " lower rate"
+                )
             self.total, self.counted = self.total + loss, self.counted + 1
             self.seconds = time.monotonic() - since
             ending, halted = self.step == settings.steps, stopped()
@@ -152,6 +112,7 @@ class Run:
                 rate = settings.rate * self.rate()
                 entry = {
                     "step": self.step,
+                    "steps": settings.steps,
                     "loss": self.total / self.counted,
                     "held_out": score,
                     "score": self.task.unit,

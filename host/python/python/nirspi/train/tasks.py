@@ -28,6 +28,8 @@ class Task:
 
     widths: tuple[int, ...] = ()
     steps, rate, unit = 20_000, 1e-3, "dB"
+    # Whether it learns from readings that an FSRCNN has enlarged.
+    enlarges = False
 
     def __init__(self, scenes, widths, enlarge=None):
         self.scenes, self.enlarge = scenes, enlarge
@@ -79,6 +81,7 @@ class Regression(Task):
     """One step from the enlarged reading to the scene."""
 
     widths, steps = (32, 64, 128), 20_000
+    enlarges = True
 
     @classmethod
     def refuse(cls, widths):
