@@ -131,15 +131,18 @@ impl Matrix {
     }
 }
 
-/// Reads a `.npy` file of patterns, of shape `(M, N)`, or `(M, H, W)` for patterns as pictures; any
+/// Reads a `.npy` file of patterns, of shape `(M, N)`, or `(M, n, n)` for patterns as pictures; any
 /// real dtype.
 ///
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
 pub fn read_matrix(path: &Path) -> Result<Matrix, FileError> {
-    let fits = |shape: &[u64]| matches!(shape.len(), 2 | 3) && !shape.contains(&0);
-    let expected = "a NumPy array (.npy) of patterns, (M, N) or (M, H, W)";
-    let of_shape = "(M, N), a pattern a row, or (M, H, W), a picture a pattern";
+    let fits = |shape: &[u64]| match *shape {
+        [_, height, width] => height == width && !shape.contains(&0),
+        _ => shape.len() == 2 && !shape.contains(&0),
+    };
+    let expected = "a NumPy array (.npy) of patterns, (M, N) or (M, n, n)";
+    let of_shape = "(M, N), a pattern a row, or (M, n, n), a picture a pattern";
     let (header, values) = read_numbers::<f64>(path, expected, fits, of_shape)?;
     let rows = header.shape()[0] as usize;
     let columns = values.len() / rows;

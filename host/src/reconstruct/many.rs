@@ -67,6 +67,17 @@ pub struct ManyImages {
     pub skipped: Vec<Skipped>,
 }
 
+impl ManyImages {
+    /// Where the readings of all images come from, as far as these have it in common. `named` is the
+    /// folder, or the first file.
+    #[must_use]
+    pub fn taken(&self, named: &Path) -> Taken {
+        let simulated = self.images.first().and_then(|image| image.taken.simulated());
+        let all = self.images.iter().all(|image| image.taken.simulated() == simulated);
+        Taken::of_file(named, simulated.filter(|_| all))
+    }
+}
+
 /// Why a file gives no image.
 #[derive(Debug, Error)]
 enum NoImage {

@@ -42,9 +42,9 @@ turns 4
 # Method, frames in an image, share of the patterns. The learned prior enlarges the last bits of its network where there is
 # much noise: with 8 frames and 30 % its images differ by 1e-4.
 CASES = [(method, 8, 0.3) for method in ["tikhonov", "omp", "tv", "fista", "hadamard"]] + [("prior", 64, 0.5)]
-# Greatest difference of a number: of an image from 0 to 1, or of counts in parts of white. WebAssembly adds numbers in another
-# order than native code. Tikhonov searches its strength, which enlarges that: 2e-5 was seen in an enhanced image.
-CLOSE = 5e-5
+# Greatest differences: of an image from 0 to 1, of counts in parts of white. WebAssembly adds numbers in another order than native
+# code. The search for Tikhonov's strength enlarges that, and a network once more: 7e-6 and 2e-5 were seen.
+CLOSE = {"readings": 1e-5, "image": 2e-5, "enhanced": 5e-5, "depth": 1e-5}
 
 
 # A device as WebUSB shows it, for page and worker. Its transfers go to the file server, which hands them to a virtual camera.
@@ -210,7 +210,7 @@ def equal(page, program):
             assert [math.isnan(a) for a, _ in pairs] == [math.isnan(b) for _, b in pairs], name
             worst[name] = max(abs(a - b) / scale for a, b in pairs if not math.isnan(a))
         print(f"{method}: greatest difference from native code: " + ", ".join(f"{n} {d:.1e}" for n, d in worst.items()))
-        assert max(worst.values()) <= CLOSE, worst
+        assert all(found <= CLOSE[name] for name, found in worst.items()), worst
 
 
 def measuring(page, address):

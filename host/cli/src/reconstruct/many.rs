@@ -10,7 +10,6 @@ use crate::report::stages;
 use anyhow::{Result, bail};
 use nirspi::files::folder::measurement_files;
 use nirspi::picture::Unit;
-use nirspi::provenance::Taken;
 use nirspi::reconstruct::{FileImage, ManyImages, many_images};
 use nirspi::source::FirstPatterns;
 use nirspi_recon::words::count_of;
@@ -28,9 +27,10 @@ pub fn run(args: &Args, first: FirstPatterns) -> Result<ExitCode> {
     let solver = args.method.solver(first, args.sampling)?;
     let mut times = stages();
     let bar = Progress::of("reconstructing", files.len(), "files");
-    let ManyImages { images, skipped } =
-        times.time("reconstruct", || many_images(&files, &options, &solver, &|| bar.add(1)));
+    let many = times.time("reconstruct", || many_images(&files, &options, &solver, &|| bar.add(1)));
     drop(bar);
+    let provenance = many.taken(&args.source.input).made(made());
+    let ManyImages { images, skipped } = many;
     if args.enhance && images.iter().any(|image| image.complex) {
         let needed = "--enhance needs real images: choose --part real or --part imaginary";
         return Err(Usage(needed.to_owned()).into());
@@ -40,7 +40,6 @@ pub fn run(args: &Args, first: FirstPatterns) -> Result<ExitCode> {
         bail!("none of {} gave an image; the first: {reason}", count_of(files.len(), "file"));
     };
     let (order, unit) = (one.order.clone(), Unit::of_readings(one.recorded));
-    let provenance = taken(&args.source.input, &images).made(made());
     // All images of a file have one white level, and files have their own.
     let stretches: Vec<usize> =
         images.chunk_by(|a, b| a.file == b.file).map(<[FileImage]>::len).collect();
@@ -83,13 +82,6 @@ pub fn run(args: &Args, first: FirstPatterns) -> Result<ExitCode> {
     let (count, all) = (report.skipped.len(), count_of(files.len(), "file"));
     print::complain(format_args!("{}: {count} of {all} gave no image", args.out.display()));
     Ok(ExitCode::FAILURE)
-}
-
-/// Where the readings come from, as far as all of them have it in common.
-fn taken(named: &Path, images: &[FileImage]) -> Taken {
-    let simulated = images.first().and_then(|image| image.taken.simulated());
-    let all = images.iter().all(|image| image.taken.simulated() == simulated);
-    Taken::of_file(named, simulated.filter(|_| all))
 }
 
 fn say(args: &Args, files: &[PathBuf], report: &Report) -> Result<()> {

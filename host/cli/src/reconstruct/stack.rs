@@ -210,11 +210,10 @@ fn solve_all(args: &Args, used: &[Measurements]) -> Result<Vec<Reconstruction>> 
 
 fn say(args: &Args, report: &Report) -> Result<()> {
     let warm = report.frames.iter().filter(|frame| frame.warm).count();
-    let what = "frame";
     print::line(format_args!(
-        "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.3} ms a {what}",
+        "{}: {} of {} x {}, order {}, {warm} started from the frame before, {:.3} ms a frame",
         report.input.display(),
-        count_of(report.frames.len(), what),
+        count_of(report.frames.len(), "frame"),
         report.n,
         report.n,
         report.order,
@@ -230,13 +229,13 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     for (at, frame) in report.frames.iter().enumerate() {
         let warnings = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
         for outlier in &frame.outliers {
-            print::line(format_args!("{what} {at}: {outlier}"))?;
+            print::line(format_args!("frame {at}: {outlier}"))?;
         }
         for warning in warnings.chain(&frame.warnings) {
-            print::line(format_args!("warning: {what} {at}: {warning}"))?;
+            print::line(format_args!("warning: frame {at}: {warning}"))?;
         }
         for note in &frame.notes {
-            print::note(format_args!("{what} {at}: {note}"))?;
+            print::note(format_args!("frame {at}: {note}"))?;
         }
     }
     let enhanced = if args.enhance { ", enhanced.npy" } else { "" };

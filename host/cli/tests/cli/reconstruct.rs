@@ -326,4 +326,7 @@ fn what_is_wrong_with_patterns_of_the_users_own_is_named() {
     write("phi.npy", &[10, 4, 4], &weights);
     run("phi.npy", &["--method", "pseudo-inverse", "--out", "again"]).succeeded();
     assert_eq!(std::fs::read(bench.path("again/image.npy")).unwrap(), image);
+    // A picture of 2 x 8 pixels is not one of 4 x 4.
+    write("phi.npy", &[10, 2, 8], &weights);
+    run("phi.npy", &[]).failed(1, &["phi.npy", "has shape (10, 2, 8)", "(M, n, n)"]);
 }
