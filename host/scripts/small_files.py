@@ -3,7 +3,8 @@
     python host/scripts/small_files.py
 
 Writes host/src/files/small/: n = 2, h_row = 0, 3, 1 and y = 5, 1, 2, 3, 4, 4.5, a complex array z of 2 x 3, and a text. Needs numpy,
-scipy and h5py.
+scipy and h5py. claims.h5 claims an array that takes more memory than a reader
+allows.
 """
 
 from pathlib import Path
@@ -41,3 +42,6 @@ with h5py.File(OUT / "h5py.h5", "w") as file:
         file[name] = array
     file["z"] = COMPLEX.astype(np.complex64)
     file["text"] = "some words"
+with h5py.File(OUT / "claims.h5", "w", libver="latest") as file:
+    # Never written: the file has no chunk of it.
+    file.create_dataset("y", (2**27,), dtype="u1", chunks=(2**20,))

@@ -254,6 +254,8 @@ pub struct Source {
     pub frames: Option<LossCounters>,
     /// Where the readings come from.
     pub taken: Taken,
+    /// What a recording or a capture lacks, in one line with its numbers: its image is of fewer frames.
+    pub damage: Option<String>,
     /// What contradicts the readings, one line each: the image may not be of the scene.
     pub warnings: Vec<String>,
     /// Notes for the user.
@@ -263,6 +265,13 @@ pub struct Source {
 }
 
 impl Source {
+    /// What a user must know of the image: what the recording lacks, and what contradicts the
+    /// readings.
+    #[must_use]
+    pub fn all_warnings(&self) -> Vec<String> {
+        self.damage.iter().chain(&self.warnings).cloned().collect()
+    }
+
     /// Corrects a reconstructed image by the flat field, if there is one.
     #[must_use]
     pub fn flattened(&self, image: Image) -> Image {
@@ -320,7 +329,6 @@ impl Source {
         let Capture { camera, setup, settling, integrated, counters, .. } = capture;
         let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
-        notes.extend(capture.missing().as_deref().map(not_whole));
         let read = of_frames(integrated.measurements(setup, settling.as_ref(), false)?)?;
         Ok(Self {
             measurements: read.measurements,
@@ -331,6 +339,7 @@ impl Source {
             reference: None,
             frames: Some(*counters),
             taken: Taken::by(camera),
+            damage: capture.missing().map(|missing| not_whole(*counters, &[missing])),
             warnings: read.doubts.iter().map(Doubt::to_string).collect(),
             notes,
             flat_field: None,
@@ -349,8 +358,11 @@ fn of_frames(measurements: Measurements) -> Result<Reading, MeasurementError> {
 }
 
 /// A note about what a capture lacks. The text may come from a file.
-fn not_whole(missing: &str) -> String {
-    format!("the recording is not whole: {}", missing.escape_debug())
+/// What is said of a recording that is not whole, for these reasons.
+fn not_whole(counters: LossCounters, reasons: &[String]) -> String {
+    // The camera's words may hold anything.
+    let reasons = reasons.join("; ").replace(char::is_control, " ");
+    format!("the recording is not whole: {counters}; {reasons}")
 }
 
 const NOT_CALIBRATED: &str = "no calibration in the recording: the settling leak stays";
@@ -446,6 +458,7 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         reference,
         frames,
         taken,
+        damage: None,
         warnings,
         notes,
         flat_field,

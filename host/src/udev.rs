@@ -5,7 +5,7 @@
 //! (`tests::a_file_of_someone_else_is_left_as_it_is`).
 
 use crate::files::FileError;
-use crate::files::output::write_atomic;
+use crate::files::output::keep;
 use nirspi_wire::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 use std::fs;
 use std::io;
@@ -98,7 +98,7 @@ pub fn install(folder: &Path) -> Result<bool, RuleError> {
     if check(folder)? == Installed::Yes {
         return Ok(false);
     }
-    write_atomic(&folder.join(RULE_NAME), rule().as_bytes())?;
+    keep(&folder.join(RULE_NAME), rule().as_bytes())?;
     Ok(true)
 }
 

@@ -153,7 +153,7 @@ fn many_damaged_places_cost_what_they_hit() {
     assert!(told.as_ref().is_some_and(|told| told.contains("bytes lost at")), "{told:?}");
 
     let whole = folder.path().join("whole.mcap");
-    let recovered = recover(&path, &Target::New(whole.clone())).unwrap();
+    let recovered = recover(&path, &whole, false).unwrap();
     assert!(recovered.bytes_lost > 0 && recovered.frames_lost.unwrap() > 0, "{recovered}");
     let (again, told) = read(&whole);
     assert_eq!((again, told), (found, None));

@@ -130,14 +130,15 @@ fn nothing_is_left_of_an_export_that_fails() {
     let cut = folder.path().join("cut.mcap");
     let bytes = std::fs::read(recording()).unwrap();
     std::fs::write(&cut, &bytes[..200]).unwrap();
-    for (input, out, told) in [
-        (cut.clone(), "rec.npz", "no identity in the recording"),
-        (recording(), "none/rec.npz", "none: cannot write to it: no such file or folder"),
-        (cut.clone(), "cut.mcap", "the file to write is the recording itself"),
+    for (input, out, overwrite, told) in [
+        (cut.clone(), "rec.npz", false, "no identity in the recording"),
+        (recording(), "none/rec.npz", false, "none: cannot write to it: no such file or folder"),
+        (recording(), "cut.mcap", false, "cut.mcap: is there already"),
+        (cut.clone(), "cut.mcap", true, "cut.mcap: the result is made of this file"),
     ] {
         let out = folder.path().join(out);
-        let error =
-            export(&input, &out, Format::Npz, &ExportOptions::default(), &made()).unwrap_err();
+        let options = ExportOptions { overwrite, ..ExportOptions::default() };
+        let error = export(&input, &out, Format::Npz, &options, &made()).unwrap_err();
         let line = nirspi::causes::in_one_line(&error);
         assert!(line.contains(told), "{line}");
     }

@@ -104,7 +104,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let warnings =
             super::reconstruct::picture(&captured, choice.flat_field.clone(), path, out)?;
         for warning in warnings {
-            print::complain(format_args!("warning: {warning}"));
+            print::warning(warning);
         }
         if !args.report.json {
             print::line(format_args!("picture: {}", out.join("enhanced.png").display()))?;

@@ -8,9 +8,8 @@ use super::provenance::made;
 use super::report::stages;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use nirspi::files::stack::ImageStack;
+use nirspi::files::stack::{ImageStack, StackTarget};
 use nirspi::imaging::{Deblurring, SPREAD_COPIES};
-use nirspi::provenance::Provenance;
 use nirspi_nets::classical;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Images, KnownEstimate, Method, Options, deblur};
@@ -122,17 +121,13 @@ impl Sharpening {
         })
     }
 
-    /// Writes the spread, if requested.
-    pub fn write_spread(
+    /// Where the spread goes, if requested.
+    pub fn spread_target(
         &self,
+        images: &ImageArgs,
         input: &ImageStack,
-        spread: Option<&[f32]>,
-        provenance: &Provenance,
-    ) -> Result<()> {
-        if let (Some(file), Some(spread)) = (&self.spread, spread) {
-            input.target(file)?.write(deblur::SIDE, spread, provenance)?;
-        }
-        Ok(())
+    ) -> Result<Option<StackTarget>> {
+        self.spread.as_ref().map(|file| images.target(input, file)).transpose()
     }
 }
 
@@ -155,7 +150,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut times = stages();
     let input = times.time("read", || args.images.read(deblur::SIDE))?;
     let images: Blurred<'_> = checked(&input)?;
-    let target = input.target(&args.images.out)?;
+    let target = args.images.target(&input, &args.images.out)?;
+    let spread = args.sharpening.spread_target(&args.images, &input)?;
     let provenance = input.taken()?.made(made());
     let bar = Progress::of("deblurring", input.count(), "images");
     let (networks, result) = match way {
@@ -179,7 +175,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     };
     drop(bar);
-    args.sharpening.write_spread(&input, result.spread.as_deref(), &provenance)?;
+    if let (Some(target), Some(spread)) = (spread, &result.spread) {
+        target.write(deblur::SIDE, spread, &provenance)?;
+    }
     let shown = target.write_and_show(deblur::SIDE, &result.images, "deblurred", &provenance)?;
 
     let (steps, consistency) = match way {

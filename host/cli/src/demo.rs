@@ -141,6 +141,7 @@ struct Report<'a> {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
+    OutputDir::create(&args.out)?.check(["scene.png", "truth.npy", "report.json"])?;
     let described = args.scene.model.read()?;
     let scene = args.scene(&described);
     let setup = args.setup.setup(Sampling::HALF, &scene.model)?;
@@ -323,7 +324,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     ))?;
     print::line(enhancement.uncertainty_line())?;
     for warning in &enhancement.warnings {
-        print::line(format_args!("warning: {warning}"))?;
+        print::warning(warning);
     }
     print::notes(&report.notes)?;
     print::line(format_args!("look at {}", args.out.join("side_by_side.png").display()))

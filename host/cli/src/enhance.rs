@@ -75,14 +75,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut times = stages();
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
-    let target = input.target(&args.images.out)?;
+    let target = args.images.target(&input, &args.images.out)?;
+    let spread = args.sharpening.spread_target(&args.images, &input)?;
+    let interval =
+        args.interval.as_ref().map(|file| args.images.target(&input, file)).transpose()?;
     let provenance = input.taken()?.made(made());
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn", "estimator", "diffusion"])?;
     let enhancer = times.time("load", || networks.enhancer(method))?;
 
-    let wanted = args.interval.as_ref();
-    let intervals = wanted.map(|_| networks.intervals(method, &options)).transpose()?;
+    let intervals = interval.as_ref().map(|_| networks.intervals(method, &options)).transpose()?;
     let readings = args.readings();
     // The refusal comes before the work.
     if let (Some(intervals), Some(readings)) = (&intervals, &readings) {
@@ -94,10 +96,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         enhancer.enhance(images, depth.as_ref(), &options, &mut |done| bar.set(done))
     })?;
     drop(bar);
-    args.sharpening.write_spread(&input, result.spread.as_deref(), &provenance)?;
-    if let (Some(file), Some(intervals), Some(readings)) = (wanted, intervals, readings) {
+    if let (Some(target), Some(spread)) = (spread, &result.spread) {
+        target.write(2 * fusion::SIDE, spread, &provenance)?;
+    }
+    if let (Some(target), Some(intervals), Some(readings)) = (interval, intervals, readings) {
         let shown = intervals.of(&result, &readings)?;
-        input.target(file)?.write(2 * fusion::SIDE, &shown, &provenance)?;
+        target.write(2 * fusion::SIDE, &shown, &provenance)?;
     }
     let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced", &provenance)?;
 

@@ -1,11 +1,11 @@
 //! `nirspi example`: a measurement for trying the program.
 
-use super::report::words;
+use super::report::{Overwrite, words};
 use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::example::Example;
 use nirspi::files::measurement;
-use nirspi::files::output::write_atomic;
+use nirspi::files::output::{Existing, write_result};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -25,6 +25,8 @@ pub struct Args {
     /// Seed of the simulated noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
@@ -33,8 +35,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let found = path.display();
         return Err(Usage(format!("--out {found}: expected a name that ends in .npz")).into());
     }
+    let existing = Existing::of(args.overwrite.overwrite, None);
+    existing.check(&path)?;
     let measured = args.example.measure(args.seed)?;
-    write_atomic(&path, &measurement::encode(&path, &measured, &provenance::simulated())?)?;
+    let encoded = measurement::encode(&path, &measured, &provenance::simulated())?;
+    write_result(&path, existing, &encoded)?;
     let (patterns, n) = (measured.rows().len(), measured.side().pixels());
     print::line(format_args!(
         "wrote {}: {n} x {n}, {patterns} patterns, simulated",

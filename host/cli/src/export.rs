@@ -3,10 +3,10 @@
 use super::camera::ModelArgs;
 use super::print;
 use super::provenance::made;
-use super::report::{ReportArgs, words};
+use super::report::{Overwrite, ReportArgs, words};
 use anyhow::Result;
 use nirspi::export::{ExportOptions, Format, export};
-use nirspi::recording::{Target, recover as recovered};
+use nirspi::recording::recover as recovered;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -31,6 +31,8 @@ pub struct Args {
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -40,9 +42,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         keep_leak: args.keep_leak,
         model: Some(args.model.read()?),
         enhance: args.enhance,
+        overwrite: args.overwrite.overwrite,
     };
     let exported = export(&args.recording, &out, args.to, &options, made())?;
     args.report.print_answer(&exported, |exported| {
+        exported.warnings.iter().for_each(print::warning);
         print::notes(&exported.notes)?;
         print::line(exported)
     })
@@ -58,10 +62,12 @@ pub struct RecoverArgs {
     #[arg(long, value_name = "FILE.mcap")]
     out: PathBuf,
     #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
 pub fn recover(args: &RecoverArgs) -> Result<ExitCode> {
-    let recovered = recovered(&args.recording, &Target::New(args.out.clone()))?;
+    let recovered = recovered(&args.recording, &args.out, args.overwrite.overwrite)?;
     args.report.print_answer(&recovered, |recovered| print::line(recovered))
 }

@@ -69,6 +69,7 @@ pub fn write(_chip: &str, _elf: &Path, _firmware: &[u8], _probe: Option<&str>) -
 fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<ExitCode> {
     use super::print;
     use anyhow::Context;
+    use nirspi::files::read_at_most;
 
     let Some((board, chip)) = board else {
         let found = nirspi::flash::probes();
@@ -81,7 +82,7 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
         return Ok(ExitCode::SUCCESS);
     };
     let elf = args.elf.clone().unwrap_or_else(|| board.elf());
-    let firmware = std::fs::read(&elf).with_context(|| {
+    let firmware = read_at_most(&elf, 256 << 20).with_context(|| {
         let hint = if args.elf.is_none() {
             format!(": build it first, bash boards/build.sh {}", board.name)
         } else {

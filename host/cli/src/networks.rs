@@ -2,14 +2,14 @@
 
 use super::Usage;
 use super::print;
-use super::report::{ReportArgs, StageTimes};
+use super::report::{Overwrite, ReportArgs, StageTimes};
 use anyhow::{Context, Result};
-use nirspi::files::stack::ImageStack;
+use nirspi::files::stack::{ImageStack, StackTarget};
 use nirspi::imaging::{Deblurring, StackReport};
 use nirspi::picture::Pictures;
 use nirspi_nets::{Arithmetic, Backend, Device, Images, Networks, WeightsError};
 use nirspi_recon::words::count_of;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Networks")]
@@ -40,6 +40,8 @@ pub struct ImageArgs {
     #[arg(long, value_name = "OUT")]
     pub out: PathBuf,
     #[command(flatten)]
+    pub overwrite: Overwrite,
+    #[command(flatten)]
     pub networks: NetworkArgs,
     #[command(flatten)]
     pub report: ReportArgs,
@@ -57,6 +59,11 @@ impl ImageArgs {
             if self.report.json { print::remark(note) } else { print::note(note)? }
         }
         Ok(images)
+    }
+
+    /// Where the results of these images go, or further results of theirs.
+    pub fn target(&self, images: &ImageStack, out: &Path) -> Result<StackTarget> {
+        Ok(images.target(out, self.overwrite.overwrite)?)
     }
 }
 

@@ -59,6 +59,11 @@ pub fn complain(text: impl fmt::Display) {
     let _ = writeln!(io::stderr(), "nirspi: {text}");
 }
 
+/// Prints what a user must know of a result, on stderr, with --quiet too.
+pub fn warning(text: impl fmt::Display) {
+    complain(format_args!("warning: {text}"));
+}
+
 /// Prints one line on stderr that is not an error. With --quiet the line is left out.
 pub fn remark(text: impl fmt::Display) {
     if !is_quiet() {

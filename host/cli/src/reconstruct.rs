@@ -14,6 +14,7 @@ use super::{Usage, print};
 use anyhow::Result;
 use nirspi::calibration::KeptFlatField;
 use nirspi::capture::Capture;
+use nirspi::files::output::OutputDir;
 use nirspi::reconstruct::{OneError, OneImage, OneReport, one_image as one};
 use nirspi::source::{FirstPatterns, Index, Source};
 use nirspi_recon::Sampling;
@@ -80,6 +81,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some(order) => FirstPatterns::Of(parse_order("--order", order)?),
     };
     args.method.check()?;
+    OutputDir::create(&args.out)?.check(["image.npy", "report.json"])?;
     if args.source.input.is_dir() || !args.more.is_empty() {
         return many::run(args, first);
     }
@@ -118,8 +120,7 @@ pub fn picture(
         source = source.with_flat_field(kept);
     }
     let report = one_image(&request, source, stages())?;
-    let of_networks = report.enhancement.map(|enhancement| enhancement.warnings);
-    Ok(report.warnings.into_iter().chain(of_networks.unwrap_or_default()).collect())
+    Ok(report.all_warnings().cloned().collect())
 }
 
 fn one_image(request: &OneImage<'_>, source: Source, times: StageTimes) -> Result<OneReport> {
@@ -138,6 +139,7 @@ fn spinning<T>(work: impl FnOnce() -> T) -> T {
 
 fn say(args: &Args, report: &OneReport) -> Result<()> {
     report.words().iter().try_for_each(print::line)?;
+    report.all_warnings().for_each(print::warning);
     print::notes(&report.notes)?;
     let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
     let parts =

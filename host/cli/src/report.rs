@@ -17,6 +17,14 @@ pub struct ReportArgs {
     pub json: bool,
 }
 
+/// What happens to a file that has the name of a result.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct Overwrite {
+    /// Replace a file that has the name of the result
+    #[arg(long)]
+    pub overwrite: bool,
+}
+
 impl ReportArgs {
     /// Prints the report of a command that has done its work, as JSON with its provenance or in words.
     pub fn print<R: Serialize + ?Sized>(

@@ -51,7 +51,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut times = stages();
     let input = times.time("read", || args.images.read(fusion::SIDE))?;
     let images: Images<'_, { fusion::SIDE }> = checked(&input)?;
-    let target = input.target(&args.images.out)?;
+    let target = args.images.target(&input, &args.images.out)?;
     let provenance = input.taken()?.made(made());
     let depth = args.depth.read(input.count())?;
     let mut networks = args.images.networks.open(&["fsrcnn"])?;

@@ -35,6 +35,8 @@ pub struct Loaded {
     /// Frames of a recording: received, lost, corrupt, late.
     frames: Option<(u64, u64, u64, u64)>,
     notes: Vec<String>,
+    /// What a recording lacks.
+    damage: Option<String>,
     flat_field: Option<Py<FlatField>>,
     /// Standard deviation of the noise of a difference of the one measurement, if it is known.
     noise: Option<f64>,
@@ -86,6 +88,7 @@ impl Loaded {
             references: stack.references().map(|images| array(py, images).unbind()),
             frames: None,
             notes: stack.notes().to_vec(),
+            damage: None,
             flat_field: None,
             noise: None,
         }))
@@ -128,6 +131,7 @@ impl Loaded {
             references: references.map(|images| array(py, images.concat()).unbind()),
             frames: first.frames.map(|c| (c.received, c.lost, c.corrupt, c.late)),
             notes,
+            damage: first.damage.clone(),
             noise,
             flat_field: flat_field.map(|flat| Py::new(py, FlatField(flat))).transpose()?,
             dropouts: sources.into_iter().map(|source| lost(source.dropouts)).collect(),

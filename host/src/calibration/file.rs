@@ -1,7 +1,7 @@
 //! Files that are kept for a camera between sessions: what calibrations and flat fields share.
 
-use crate::files::output::{OutputDir, write_atomic};
-use crate::files::{FileError, read_small};
+use crate::files::output::keep;
+use crate::files::{FileError, read_small_text};
 use etcetera::HomeDirError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -122,16 +122,7 @@ impl Kept {
             Self::FlatField => serde_json::to_vec(content),
         }
         .map_err(|e| self.format_error(path, &e))?;
-        match (path.parent(), path.file_name().and_then(|name| name.to_str())) {
-            (Some(folder), Some(name)) => {
-                let mut folder = OutputDir::create(folder)?;
-                folder.write(name, &json)?;
-                folder.commit()?;
-            }
-            // `write_atomic` reports the problem of such a path.
-            _ => write_atomic(path, &json)?,
-        }
-        Ok(())
+        Ok(keep(path, &json)?)
     }
 
     /// Reads a file whose field `kind` is a `Kind`, in the current version of its format.
@@ -146,18 +137,18 @@ impl Kept {
             _kind: Kind,
             version: u32,
         }
-        let text = read_small(path).map_err(|source| KeptFileError::Io {
+        let text = read_small_text(path).map_err(|source| KeptFileError::Io {
             path: path.to_owned(),
             kept: self,
             source,
         })?;
         let head: Head<Kind> =
-            serde_json::from_slice(&text).map_err(|e| self.format_error(path, &e))?;
+            serde_json::from_str(&text).map_err(|e| self.format_error(path, &e))?;
         if head.version != self.format() {
             let (path, found) = (path.to_owned(), head.version);
             return Err(KeptFileError::Version { path, kept: self, found });
         }
-        serde_json::from_slice(&text).map_err(|e| self.format_error(path, &e))
+        serde_json::from_str(&text).map_err(|e| self.format_error(path, &e))
     }
 
     /// Refuses a file of which a property is not that of the camera: name, in the file, of the camera.

@@ -4,7 +4,7 @@ use super::{ExportError, Whole};
 use crate::files::FileError;
 use crate::files::measurement::{NOISE, PROVENANCE};
 use crate::files::npy::{Element, encode, encode_text, header};
-use crate::files::output::{write_atomic, write_in_pieces};
+use crate::files::output::{Existing, write_in_pieces, write_result};
 use crate::provenance::Provenance;
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -13,8 +13,13 @@ use zip::{CompressionMethod, ZipWriter};
 
 /// Writes a `.npz` file. Its members are not compressed, because readings are noise for a
 /// compressor.
-pub(super) fn npz(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
-    write_in_pieces(out, |file| {
+pub(super) fn npz(
+    whole: &Whole,
+    out: &Path,
+    existing: Existing<'_>,
+    provenance: &Provenance,
+) -> Result<(), ExportError> {
+    write_in_pieces(out, existing, |file| {
         let mut zip = Members { zip: ZipWriter::new(file), out };
         let rows = whole.source.measurements.rows();
         let h_row: Vec<i64> = rows.iter().map(|&row| row.into()).collect();
@@ -60,11 +65,17 @@ impl<W: Write + Seek> Members<'_, W> {
 }
 
 /// Writes the readings of each frame as one array (F, M), and the provenance into a file beside it.
-pub(super) fn npy(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
-    write_in_pieces(out, |file| frames(whole, out, file))?;
+pub(super) fn npy(
+    whole: &Whole,
+    out: &Path,
+    existing: Existing<'_>,
+    provenance: &Provenance,
+) -> Result<(), ExportError> {
     let beside = beside(out);
+    existing.check(&beside)?;
+    write_in_pieces(out, existing, |file| frames(whole, out, file))?;
     let text = provenance.sign(&serde_json::json!({})).unwrap_or_default();
-    Ok(write_atomic(&beside, text.as_bytes())?)
+    Ok(write_result(&beside, existing, text.as_bytes())?)
 }
 
 /// The file with the provenance of an `.npy` file: the same name with `.json` after it.
@@ -91,10 +102,15 @@ fn frames(whole: &Whole, out: &Path, to: &mut impl Write) -> Result<(), ExportEr
 /// Writes the mean of all frames, one pattern a line, under the heading `n,h_row,d,noise`, without
 /// `noise` if that is not known. The numbers
 /// read back as they were. Comments before the heading have the provenance.
-pub(super) fn csv(whole: &Whole, out: &Path, provenance: &Provenance) -> Result<(), ExportError> {
+pub(super) fn csv(
+    whole: &Whole,
+    out: &Path,
+    existing: Existing<'_>,
+    provenance: &Provenance,
+) -> Result<(), ExportError> {
     let measurements = &whole.source.measurements;
     let n = measurements.side().pixels();
-    write_in_pieces(out, |file| {
+    write_in_pieces(out, existing, |file| {
         let lines = measurements.rows().iter().zip(measurements.values());
         let write = || -> io::Result<()> {
             let what = if whole.is_simulated() { ", simulated" } else { "" };

@@ -5,7 +5,7 @@
 
 use super::{ExportError, ExportOptions, Whole};
 use crate::files::FileError;
-use crate::files::output::write_in_pieces;
+use crate::files::output::{Existing, write_in_pieces};
 use crate::integrate::Integrated;
 use crate::provenance::Provenance;
 use crate::recording::{Book, Opening, Recording};
@@ -45,7 +45,7 @@ pub(super) fn write(
         }
         Ok(())
     })?;
-    write_in_pieces(out, |file| {
+    write_in_pieces(out, Existing::of(options.overwrite, Some(&whole.path)), |file| {
         let io_error = |error| FileError::io(out, "write", error);
         let mut recording = Recording::open(&whole.path)?;
         let (identity, setup) = (recording.identity.clone(), recording.setup.clone());

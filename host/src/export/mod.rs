@@ -15,6 +15,7 @@ mod mcap;
 mod video;
 
 use crate::files::FileError;
+use crate::files::output::Existing;
 use crate::integrate::{IntegrateError, Integrated};
 use crate::provenance::Made;
 use crate::recording::{Recording, RecordingError};
@@ -129,6 +130,8 @@ pub struct ExportOptions {
     /// Whether MCAP files also get the enhanced images, and how well each of their pixels repeats.
     #[cfg(feature = "enhance")]
     pub enhance: bool,
+    /// Whether a file of the same name is replaced. The recording itself never is.
+    pub overwrite: bool,
 }
 
 /// What was exported.
@@ -146,6 +149,8 @@ pub struct Exported {
     pub patterns: usize,
     /// Images in the file.
     pub images: usize,
+    /// What a user must know: what the recording lacks, and what contradicts its readings.
+    pub warnings: Vec<String>,
     /// Notes about the recording.
     pub notes: Vec<String>,
 }
@@ -175,9 +180,6 @@ pub enum ExportError {
     /// The file cannot be written, or the image of the scene cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The recording would be replaced.
-    #[error("{}: the file to write is the recording itself, expected another name", .0.display())]
-    Itself(PathBuf),
     /// The recording changed between two readings.
     #[error("{}: the recording changed while it was read: export it when its capture has ended", .0.display())]
     Changed(PathBuf),
@@ -223,26 +225,24 @@ pub fn export(
     options: &ExportOptions,
     made: &Made,
 ) -> Result<Exported, ExportError> {
-    if let (Ok(from), Ok(to)) = (input.canonicalize(), out.canonicalize())
-        && from == to
-    {
-        return Err(ExportError::Itself(out.to_owned()));
-    }
+    let existing = Existing::of(options.overwrite, Some(input));
+    existing.check(out)?;
     let source = SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
     let whole = Whole::read(input, &source)?;
     let provenance = &whole.source.taken.made(made);
     let mut images = 0;
     match format {
-        Format::Npz => arrays::npz(&whole, out, provenance)?,
-        Format::Npy => arrays::npy(&whole, out, provenance)?,
-        Format::Csv => arrays::csv(&whole, out, provenance)?,
+        Format::Npz => arrays::npz(&whole, out, existing, provenance)?,
+        Format::Npy => arrays::npy(&whole, out, existing, provenance)?,
+        Format::Csv => arrays::csv(&whole, out, existing, provenance)?,
         Format::Mcap => images = mcap::write(&whole, out, options, provenance)?,
         #[cfg(feature = "pictures")]
-        Format::Apng => images = video::apng(&whole, out, provenance)?,
+        Format::Apng => images = video::apng(&whole, out, existing, provenance)?,
     }
     let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
     let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
-    let (file, mut notes) = (out.to_owned(), whole.source.notes);
+    let (file, warnings) = (out.to_owned(), whole.source.all_warnings());
+    let mut notes = whole.source.notes;
     if whole.source.flat_field.is_some() && format.holds_readings() {
         notes.push(
             "readings are exported without the flat field that is kept for this camera, so their image has the \
@@ -250,7 +250,7 @@ pub fn export(
                 .to_owned(),
         );
     }
-    Ok(Exported { file, format, bytes, frames, patterns, images, notes })
+    Ok(Exported { file, format, bytes, frames, patterns, images, warnings, notes })
 }
 
 /// A recording that was read once: the mean of its frames, and the numbers and times of the frames.

@@ -1,7 +1,7 @@
 //! A recording as a video: the images of its frames.
 
 use super::{ExportError, Whole};
-use crate::files::output::write_atomic;
+use crate::files::output::{Existing, write_result};
 use crate::picture::{Unit, video};
 use crate::provenance::Provenance;
 use nirspi_recon::reconstruct::{Method, Reconstruct, Stacked};
@@ -51,6 +51,7 @@ impl Groups {
 pub(super) fn apng(
     whole: &Whole,
     out: &Path,
+    existing: Existing<'_>,
     provenance: &Provenance,
 ) -> Result<usize, ExportError> {
     let frames = whole.frames();
@@ -72,7 +73,8 @@ pub(super) fn apng(
         Ok(())
     })?;
     let header = format!("{}, {frames} frames", whole.path.display());
-    write_atomic(out, &video(&header, &images, Unit::AdcCounts, provenance))?;
+    let bytes = video(&header, &images, Unit::AdcCounts, provenance);
+    write_result(out, existing, &bytes)?;
     Ok(images.len())
 }
 

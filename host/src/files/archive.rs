@@ -7,7 +7,7 @@
 //! (`measurement::tests::a_changed_reading_is_caught_by_the_checksum`).
 
 use super::FileError;
-use super::array::{ArrayError, Header, Sample, has_shape, shape_text};
+use super::array::{ArrayError, Header, MAX_MEMORY_BYTES, Sample, claims, has_shape};
 use super::fields::Field;
 use super::plain::{kind_by_start, open_file};
 use super::stored::Stored;
@@ -27,8 +27,6 @@ pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
 const MAX_FIELD_BYTES: u64 = 256 << 20;
-/// The most memory that the numbers of a field may take: 512 sweeps of 256 x 256 pairs in float64.
-const MAX_MEMORY_BYTES: u64 = 512 << 20;
 
 /// An open archive.
 pub(super) struct Archive {
@@ -172,10 +170,7 @@ impl Archive {
             ArrayError::Damaged(what) => damaged(path, format!("`{field}`: {what}")),
             ArrayError::Io(error) => damaged(path, format!("`{field}`: {error}")),
             ArrayError::Dtype(found) => refuse(found, NUMBERS.to_owned()),
-            ArrayError::TooLarge { shape, limit_bytes } => refuse(
-                format!("claims shape {}", shape_text(&shape)),
-                format!("at most {} MiB", limit_bytes >> 20),
-            ),
+            ArrayError::TooLarge { shape, limit_bytes } => claims(path, field, &shape, limit_bytes),
         };
         let header = Header::read(&mut member).map_err(explain)?;
         accept(header.shape()).map_err(|expected| refuse(has_shape(header.shape()), expected))?;

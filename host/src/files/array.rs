@@ -8,8 +8,10 @@
 //! Every claim of a header is checked before it is used, and memory grows with the bytes that
 //! arrived (`tests::a_claim_beyond_the_limit_takes_no_memory`).
 
+use super::FileError;
 use super::error::Shown;
 use std::io::{self, Read};
+use std::path::Path;
 
 /// The first bytes of every `.npy` file.
 pub(super) use super::plain::NUMPY as MAGIC;
@@ -225,6 +227,32 @@ pub(super) fn shape_text(shape: &[u64]) -> String {
         [one] => format!("({one},)"),
         axes => format!("({})", axes.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")),
     }
+}
+
+/// The most memory that the numbers of a field may take, in any format: 512 sweeps of 256 x 256 pairs
+/// in float64. A byte of a packed file can become a thousand numbers.
+pub(super) const MAX_MEMORY_BYTES: u64 = 512 << 20;
+
+/// Refuses a field of this shape before its numbers are read, if they take more than
+/// [`MAX_MEMORY_BYTES`] as float64, twice as many where they are complex.
+pub(super) fn within_memory(
+    path: &Path,
+    field: &str,
+    shape: &[u64],
+    is_complex: bool,
+) -> Result<(), FileError> {
+    let parts = if is_complex { 2 } else { 1 };
+    let each = size_of::<f64>() as u64 * parts;
+    match shape.iter().try_fold(each, |bytes, &axis| bytes.checked_mul(axis)) {
+        Some(bytes) if bytes <= MAX_MEMORY_BYTES => Ok(()),
+        _ => Err(claims(path, field, shape, MAX_MEMORY_BYTES)),
+    }
+}
+
+/// A field that claims more than is read.
+pub(super) fn claims(path: &Path, field: &str, shape: &[u64], limit_bytes: u64) -> FileError {
+    let found = format!("claims shape {}", shape_text(shape));
+    FileError::field(path, field, found, format!("at most {} MiB", limit_bytes >> 20))
 }
 
 /// The part of an error message that states an unexpected shape.

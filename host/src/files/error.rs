@@ -82,6 +82,20 @@ pub enum FileError {
         /// The value expected.
         expected: String,
     },
+    /// A file has the name of a result and stays.
+    #[error("{}: is there already, expected {expected}", Shown::path(path))]
+    Exists {
+        /// The file that is there.
+        path: PathBuf,
+        /// What the caller can choose.
+        expected: &'static str,
+    },
+    /// The result would replace the file that it is made of.
+    #[error("{}: the result is made of this file, expected another name for it", Shown::path(path))]
+    Source {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file holds several measurements, and the caller chose none or an index that is too
     /// large.
     #[error("{}: `{}` holds {}", Shown::path(path), Shown::text(field), choice(*count, *asked))]

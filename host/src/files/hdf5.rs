@@ -4,7 +4,7 @@
 //! file claims.
 
 use super::FileError;
-use super::array::{MAX_AXES, has_shape};
+use super::array::{MAX_AXES, has_shape, within_memory};
 use super::fields::Field;
 use hdf5_reader::error::Error;
 use hdf5_reader::messages::datatype::{CompoundField, Datatype};
@@ -61,13 +61,14 @@ impl Hdf5 {
         let Some((element_bytes, parts)) = parts else {
             return Err(refuse("is no array of numbers".to_owned(), "numbers of up to 8 bytes"));
         };
+        within_memory(&self.path, field, &stored, parts.1.is_some())?;
         let bytes = data.read_raw_bytes().map_err(explain)?;
         let count = stored.iter().try_fold(1_u64, |product, &axis| product.checked_mul(axis));
-        let elements: Vec<&[u8]> = bytes.chunks_exact(element_bytes).collect();
+        let elements = bytes.chunks_exact(element_bytes);
         if count != Some(elements.len() as u64) {
             return Err(damaged(&self.path, format!("`{field}`: {} numbers", elements.len())));
         }
-        let part = |part: &Part| -> Vec<f64> { elements.iter().map(|e| part.number(e)).collect() };
+        let part = |part: &Part| -> Vec<f64> { elements.clone().map(|e| part.number(e)).collect() };
         let (real, imaginary) = (part(&parts.0), parts.1.as_ref().map(part));
         let shape = shape.iter().map(|&axis| axis as usize).collect();
         Ok(match self.is_matlab {

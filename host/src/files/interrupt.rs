@@ -136,7 +136,7 @@ mod tests {
         assert_eq!(ours.len(), 5, "three folders and two files: {ours:?}");
         remove(&ours);
         assert!(!root.path().join("made").exists());
-        assert_eq!(names(&root.path().join("done")), 1);
+        assert!(root.path().join("done/a.npy").exists());
         drop(dir);
         assert!(!unfinished().iter().any(|path| path.starts_with(root.path())));
     }

@@ -8,7 +8,7 @@
 //! limit.
 
 use super::FileError;
-use super::array::{MAX_AXES, has_shape};
+use super::array::{MAX_AXES, has_shape, within_memory};
 use super::fields::Field;
 use flate2::bufread::ZlibDecoder;
 use std::io::Read;
@@ -155,6 +155,7 @@ impl Mat {
             return Err(refuse(format!("is {kind}"), "an array of numbers".to_owned()));
         }
         accept(&head.shape).map_err(|expected| refuse(has_shape(&head.shape), expected))?;
+        within_memory(&self.path, field, &head.shape, head.is_complex)?;
         let count = head.shape.iter().try_fold(1_u64, |product, &axis| product.checked_mul(axis));
         let real = self.element(head.rest).ok_or_else(cut)?;
         let numbers = |element: &Element<'_>| {

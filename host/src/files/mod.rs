@@ -52,4 +52,5 @@ mod text;
 #[cfg(feature = "training")]
 pub(crate) use archive::encode as encode_archive;
 pub use error::FileError;
-pub use plain::read_small;
+pub(crate) use plain::read_text;
+pub use plain::{read_at_most, read_small, read_small_text};

@@ -50,7 +50,7 @@ mod tests {
             (&b"0 1\n2 x\n"[..], "\"x\" in line 2"),
             (b"0 -1", "\"-1\" in line 1"),
             (b"0 1.5", "\"1.5\" in line 1"),
-            (b"\xff\xfe", "a binary file"),
+            (b"\xc3\x28", "a binary file"),
             (b"", "an empty file"),
         ] {
             let (_folder, path) = file("order.txt", content);

@@ -1,6 +1,16 @@
-//! Writes results to disk: each file is whole, or does not exist.
+//! Writes results to disk: each file is whole, or does not exist, and replaces nothing that a user
+//! may miss.
+//!
+//! A result that is one file is refused where a file has its name, unless the user asks to replace
+//! it; then its mode stays, and a link to it. The results of a run that are a folder replace the
+//! whole results of an earlier run, and nothing else.
 //!
 //! # Invariant
+//! No result replaces what it was made of (`tests::no_result_replaces_what_it_was_made_of`), nor a
+//! file that a person put into a folder of results or changed there
+//! (`tests::a_folder_keeps_what_is_not_ours`). No folder has results of two runs of one kind
+//! (`tests::a_run_replaces_all_of_the_run_before`).
+//!
 //! A file appears under its name only when it is complete and synced to the disk
 //! (`tests::files_appear_only_at_commit`). A run that fails leaves everything as before, without
 //! the folders that it made (`tests::a_run_that_fails_leaves_nothing_of_its_own`,
@@ -8,8 +18,11 @@
 //! receive more files than a process may have open
 //! (`tests::a_folder_keeps_no_file_open_however_many_it_takes`).
 
+mod earlier;
+
 use super::FileError;
 use super::interrupt::Noted;
+use earlier::Earlier;
 use std::fs;
 use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
@@ -21,15 +34,16 @@ pub(super) const STAGED_PREFIX: &str = ".nirspi-";
 /// A folder that receives all the results of a run at once.
 ///
 /// [`create`](Self::create) makes the folder, [`write`](Self::write) stages files in the folder
-/// under hidden names, and [`commit`](Self::commit) renames the files into place and replaces older
-/// files of the same name. An `OutputDir` that is dropped without `commit` removes its staged files
-/// and every folder that it made.
+/// under hidden names, and [`commit`](Self::commit) renames the files into place and removes the
+/// results of an earlier run. An `OutputDir` that is dropped without `commit` removes its staged
+/// files and every folder that it made.
 #[derive(Debug)]
 pub struct OutputDir {
     path: PathBuf,
     /// `staged` comes before `made`, so that the files are removed before the folders.
-    staged: Vec<(Staged, PathBuf)>,
+    staged: Vec<(Staged, String)>,
     made: MadeFolders,
+    earlier: Earlier,
 }
 
 impl OutputDir {
@@ -38,27 +52,14 @@ impl OutputDir {
     /// # Errors
     /// [`FileError`] if the path is a file, or the system refuses. Nothing is left behind.
     pub fn create(path: &Path) -> Result<Self, FileError> {
-        let mut made = MadeFolders(Vec::new());
-        // `--out name/` and `--out name` are the same folder, and an empty path is the current
-        // folder.
-        let missing: Vec<&Path> = path
-            .ancestors()
-            .take_while(|p| !p.as_os_str().is_empty() && fs::symlink_metadata(p).is_err())
-            .collect();
-        for folder in missing.into_iter().rev() {
-            match Noted::make(folder, || fs::create_dir(folder)) {
-                Ok(((), noted)) => made.0.push((folder.to_owned(), noted)),
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-                Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
-                    let file = folder.parent().unwrap_or(folder);
-                    return Err(FileError::kind(file, "a file", "a folder for the results"));
-                }
-                Err(error) => return Err(FileError::io(folder, "create", error)),
-            }
-        }
+        refuse_dash(path)?;
+        let made = MadeFolders::on_the_way_to(path)?;
         let path = if path.as_os_str().is_empty() { PathBuf::from(".") } else { path.to_owned() };
         match fs::metadata(&path) {
-            Ok(metadata) if metadata.is_dir() => Ok(Self { path, staged: Vec::new(), made }),
+            Ok(metadata) if metadata.is_dir() => {
+                let earlier = Earlier::of(&path);
+                Ok(Self { path, staged: Vec::new(), made, earlier })
+            }
             Ok(_) => Err(FileError::kind(&path, "a file", "a folder for the results")),
             Err(error) => Err(FileError::io(&path, "create", error)),
         }
@@ -70,20 +71,39 @@ impl OutputDir {
         &self.path
     }
 
+    /// Refuses a folder in which a file has one of these names and is not as a run of this program
+    /// wrote it. A command asks this before a long computation; [`write`](Self::write) asks it for
+    /// each file.
+    ///
+    /// # Errors
+    /// [`FileError::Exists`] for the first such file.
+    pub fn check<'n>(&self, names: impl IntoIterator<Item = &'n str>) -> Result<(), FileError> {
+        names.into_iter().try_for_each(|name| {
+            let path = self.path.join(name);
+            match fs::symlink_metadata(&path).is_ok() && !self.earlier.wrote(&path, name) {
+                true => Err(FileError::Exists { path, expected: "another folder for the results" }),
+                false => Ok(()),
+            }
+        })
+    }
+
     /// Stages a file named `name` (a plain file name) in the folder.
     ///
     /// # Errors
-    /// [`FileError`] names the file and the system's reason.
+    /// [`FileError`] names the file and the system's reason; as [`check`](Self::check).
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), FileError> {
         let target = self.path.join(name);
-        let staged = stage(&self.path, &target, |file| {
+        self.check([name])?;
+        let ((), staged) = stage(&target, |file| {
             file.write_all(bytes).map_err(|error| FileError::io(&target, "write", error))
         })?;
-        self.staged.push((staged, target));
+        self.earlier.written(name, bytes);
+        self.staged.push((staged, name.to_owned()));
         Ok(())
     }
 
-    /// Renames every staged file into place and returns their paths in the order written.
+    /// Renames every staged file into place, removes the other files of the run that these results
+    /// replace, and returns the paths in the order written.
     ///
     /// # Errors
     /// [`FileError`] names the first file that could not be placed. New files placed before the
@@ -91,9 +111,11 @@ impl OutputDir {
     pub fn commit(mut self) -> Result<Vec<PathBuf>, FileError> {
         let _undisturbed = super::interrupt::undisturbed();
         let mut placed: Vec<(PathBuf, bool)> = Vec::new();
-        for (staged, target) in std::mem::take(&mut self.staged) {
-            let replaces = target.exists();
-            if let Err(error) = place(staged, &target) {
+        for (staged, name) in std::mem::take(&mut self.staged) {
+            let target = self.path.join(&name);
+            let replaces = fs::symlink_metadata(&target).is_ok();
+            let done = self.check([&*name]).and_then(|()| place(staged, &target, replaces));
+            if let Err(error) = done {
                 for (new, _) in placed.iter().filter(|(_, replaced)| !replaced) {
                     // The first error is reported; an error of the removal adds nothing.
                     let _ = fs::remove_file(new);
@@ -102,36 +124,133 @@ impl OutputDir {
             }
             placed.push((target, replaces));
         }
+        std::mem::take(&mut self.earlier).replace(&self.path)?;
         sync_folder(&self.path).map_err(|error| FileError::io(&self.path, "write to", error))?;
         self.made.0.clear();
         Ok(placed.into_iter().map(|(path, _)| path).collect())
     }
 }
 
-/// Writes one file, whole or not at all.
+/// What happens to a file that has the name of a result.
+#[derive(Debug, Clone, Copy)]
+pub enum Existing<'a> {
+    /// The file stays, and the result is refused.
+    Stays,
+    /// The file is replaced, unless the result is made of it.
+    Replaced {
+        /// The file or folder that the result is made of, if it is made of one.
+        made_of: Option<&'a Path>,
+    },
+}
+
+impl<'a> Existing<'a> {
+    /// What an option `--overwrite` says, of a result made of `made_of`.
+    #[must_use]
+    pub fn of(overwrite: bool, made_of: Option<&'a Path>) -> Self {
+        if overwrite { Self::Replaced { made_of } } else { Self::Stays }
+    }
+
+    /// Refuses a result whose name is taken. A command asks this before a long computation; the
+    /// functions that write ask it again.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file of that name is there and has to stay.
+    pub fn check(self, target: &Path) -> Result<(), FileError> {
+        refuse_dash(target)?;
+        let Ok(found) = fs::metadata(target) else { return Ok(()) };
+        if found.is_dir() {
+            return Err(FileError::kind(target, "a folder", "a file to write"));
+        }
+        if !found.is_file() {
+            return Err(FileError::kind(target, "a device or pipe", "a file to write"));
+        }
+        let path = target.to_owned();
+        match self {
+            Self::Stays => {
+                Err(FileError::Exists { path, expected: "a name that is free, or --overwrite" })
+            }
+            Self::Replaced { made_of: Some(source) } if is_part_of(target, source) => {
+                Err(FileError::Source { path })
+            }
+            Self::Replaced { .. } => Ok(()),
+        }
+    }
+}
+
+/// Other programs take `-` for the standard output, to which no result of this one is written.
+fn refuse_dash(path: &Path) -> Result<(), FileError> {
+    match path.as_os_str() == "-" {
+        true => Err(FileError::kind(path, "no name", "a name; ./- is a file of this name")),
+        false => Ok(()),
+    }
+}
+
+/// Whether a file is this file, by whatever name, or lies in this folder.
+fn is_part_of(file: &Path, whole: &Path) -> bool {
+    let (Ok(file), Ok(whole)) = (file.canonicalize(), whole.canonicalize()) else { return false };
+    file.starts_with(&whole) || is_hard_link(&file, &whole)
+}
+
+#[cfg(unix)]
+fn is_hard_link(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |path: &Path| fs::metadata(path).ok().map(|found| (found.dev(), found.ino()));
+    identity(a).is_some() && identity(a) == identity(b)
+}
+
+#[cfg(not(unix))]
+fn is_hard_link(_: &Path, _: &Path) -> bool {
+    false
+}
+
+/// Writes a result of one file, whole or not at all.
 ///
 /// # Errors
-/// [`FileError`] if the folder is missing, the path is a folder, or the system refuses.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    write_in_pieces(path, |file| {
+/// [`FileError`] if the name is taken, the folder is missing, the path is a folder, or the system
+/// refuses.
+pub fn write_result(path: &Path, existing: Existing<'_>, bytes: &[u8]) -> Result<(), FileError> {
+    write_in_pieces(path, existing, |file| {
         file.write_all(bytes).map_err(|error| FileError::io(path, "write", error))
     })
 }
 
-/// Writes one file piece by piece, whole or not at all: results that are larger than the memory.
+/// Writes a result of one file piece by piece, whole or not at all: results that are larger than the
+/// memory.
 ///
 /// # Errors
-/// As [`write_atomic`], and the errors of `write`.
-pub fn write_in_pieces<E: From<FileError>>(
+/// As [`write_result`], and the errors of `write`.
+pub fn write_in_pieces<T, E: From<FileError>>(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<fs::File>) -> Result<(), E>,
-) -> Result<(), E> {
-    let folder = match path.parent() {
+    existing: Existing<'_>,
+    write: impl FnOnce(&mut BufWriter<fs::File>) -> Result<T, E>,
+) -> Result<T, E> {
+    existing.check(path)?;
+    let (written, staged) = stage(path, write)?;
+    place(staged, path, matches!(existing, Existing::Replaced { .. }))?;
+    let folder = folder_of(path);
+    sync_folder(folder).map_err(|error| FileError::io(folder, "write to", error))?;
+    Ok(written)
+}
+
+/// Writes a file that this program keeps for itself, such as settings, whole or not at all. An older
+/// one is replaced. Missing folders on its path are made.
+///
+/// # Errors
+/// [`FileError`] if the path is a folder, or the system refuses.
+pub fn keep(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let mut made = MadeFolders::on_the_way_to(path.parent().unwrap_or(Path::new("")))?;
+    write_in_pieces(path, Existing::Replaced { made_of: None }, |file| {
+        file.write_all(bytes).map_err(|error| FileError::io(path, "write", error))
+    })?;
+    made.0.clear();
+    Ok(())
+}
+
+fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
-    };
-    place(stage(folder, path, write)?, path)?;
-    Ok(sync_folder(folder).map_err(|error| FileError::io(folder, "write to", error))?)
+    }
 }
 
 /// Syncs the names in a folder to the disk, on systems that can do so.
@@ -159,6 +278,31 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
 #[derive(Debug)]
 struct MadeFolders(Vec<(PathBuf, Noted)>);
 
+impl MadeFolders {
+    /// Makes the folders that are missing on this path.
+    fn on_the_way_to(path: &Path) -> Result<Self, FileError> {
+        let mut made = Self(Vec::new());
+        // `--out name/` and `--out name` are the same folder, and an empty path is the current
+        // folder.
+        let missing: Vec<&Path> = path
+            .ancestors()
+            .take_while(|p| !p.as_os_str().is_empty() && fs::symlink_metadata(p).is_err())
+            .collect();
+        for folder in missing.into_iter().rev() {
+            match Noted::make(folder, || fs::create_dir(folder)) {
+                Ok(((), noted)) => made.0.push((folder.to_owned(), noted)),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
+                    let file = folder.parent().unwrap_or(folder);
+                    return Err(FileError::kind(file, "a file", "a folder for the results"));
+                }
+                Err(error) => return Err(FileError::io(folder, "create", error)),
+            }
+        }
+        Ok(made)
+    }
+}
+
 impl Drop for MadeFolders {
     fn drop(&mut self) {
         for (folder, _) in self.0.iter().rev() {
@@ -169,14 +313,14 @@ impl Drop for MadeFolders {
     }
 }
 
-fn stage<E: From<FileError>>(
-    folder: &Path,
+/// Writes a file under a hidden name beside the file that it will be.
+fn stage<T, E: From<FileError>>(
     target: &Path,
-    fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<(), E>,
-) -> Result<Staged, E> {
-    if target.is_dir() {
-        return Err(FileError::kind(target, "a folder", "a file to write").into());
-    }
+    fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<T, E>,
+) -> Result<(T, Staged), E> {
+    // A link stays: the file behind it is replaced, and the hidden file is beside that one.
+    let behind = fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
+    let folder = folder_of(&behind);
     // The error names the missing folder, not the hidden file in it.
     if let Err(error) = fs::metadata(folder) {
         return Err(FileError::io(folder, "write to", error).into());
@@ -189,176 +333,41 @@ fn stage<E: From<FileError>>(
         .make_in(folder, |path| Noted::make(path, || fs::File::create_new(path)))
         .map_err(write)?;
     let ((file, noted), path) = staged.into_parts();
-    let staged = Staged { path, _noted: noted };
+    let staged = Staged { path, behind, _noted: noted };
     let mut file = BufWriter::new(file);
-    fill(&mut file)?;
+    let filled = fill(&mut file)?;
     file.into_inner()
         .map_err(IntoInnerError::into_error)
         .and_then(|file| file.sync_all())
         .map_err(write)?;
-    Ok(staged)
+    Ok((filled, staged))
 }
 
 /// A file under its hidden name.
 #[derive(Debug)]
 struct Staged {
     path: TempPath,
+    /// The path that the file will have.
+    behind: PathBuf,
     _noted: Noted,
 }
 
-fn place(staged: Staged, target: &Path) -> Result<(), FileError> {
-    staged.path.persist(target).map_err(|error| FileError::io(target, "write", error.error))
+/// Renames a file into place. Without `replaces`, a file of that name stays and is the error.
+fn place(staged: Staged, target: &Path, replaces: bool) -> Result<(), FileError> {
+    let Staged { path, behind, _noted } = staged;
+    if replaces && let Ok(old) = fs::metadata(&behind) {
+        // A file system that has no modes refuses.
+        let _ = fs::set_permissions(&path, old.permissions());
+    }
+    let placed = if replaces { path.persist(behind) } else { path.persist_noclobber(behind) };
+    placed.map_err(|error| match error.error.kind() {
+        io::ErrorKind::AlreadyExists => {
+            let expected = "a name that is free: another program has taken it meanwhile";
+            FileError::Exists { path: target.to_owned(), expected }
+        }
+        _ => FileError::io(target, "write", error.error),
+    })
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> = fs::read_dir(folder)
-            .unwrap()
-            .map(|e| e.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
-
-    fn line(error: &FileError) -> String {
-        let line = error.to_string();
-        assert!(!line.contains('\n'), "{line}");
-        line
-    }
-
-    #[test]
-    fn files_appear_only_at_commit() {
-        let root = tempfile::tempdir().unwrap();
-        let out = root.path().join("a/b/out");
-        let mut dir = OutputDir::create(&out).unwrap();
-        dir.write("image.npy", b"123").unwrap();
-        dir.write("report.json", b"{}").unwrap();
-        assert!(!out.join("image.npy").exists() && !out.join("report.json").exists());
-        let paths = dir.commit().unwrap();
-        assert_eq!(paths, [out.join("image.npy"), out.join("report.json")]);
-        assert_eq!(names(&out), ["image.npy", "report.json"]);
-        assert_eq!(fs::read(out.join("image.npy")).unwrap(), b"123");
-    }
-
-    #[test]
-    fn a_run_that_fails_leaves_nothing_of_its_own() {
-        let root = tempfile::tempdir().unwrap();
-        let mut dir = OutputDir::create(&root.path().join("a/b/out")).unwrap();
-        dir.write("image.npy", b"123").unwrap();
-        drop(dir);
-        assert!(names(root.path()).is_empty(), "{:?}", names(root.path()));
-    }
-
-    #[test]
-    fn a_run_without_results_keeps_its_folder() {
-        let root = tempfile::tempdir().unwrap();
-        let out = root.path().join("out");
-        assert!(OutputDir::create(&out).unwrap().commit().unwrap().is_empty());
-        assert!(out.is_dir());
-    }
-
-    #[test]
-    fn a_run_that_fails_leaves_what_was_there() {
-        let root = tempfile::tempdir().unwrap();
-        fs::write(root.path().join("image.npy"), b"old").unwrap();
-        let mut dir = OutputDir::create(root.path()).unwrap();
-        dir.write("image.npy", b"new").unwrap();
-        drop(dir);
-        assert_eq!(names(root.path()), ["image.npy"]);
-        assert_eq!(fs::read(root.path().join("image.npy")).unwrap(), b"old");
-    }
-
-    #[test]
-    fn a_failing_commit_takes_its_new_files_back() {
-        let root = tempfile::tempdir().unwrap();
-        let out = root.path().join("out");
-        let mut dir = OutputDir::create(&out).unwrap();
-        dir.write("first.npy", b"1").unwrap();
-        dir.write("second.npy", b"2").unwrap();
-        fs::create_dir(out.join("second.npy")).unwrap();
-        let error = dir.commit().unwrap_err();
-        assert!(line(&error).contains("second.npy: cannot write it"), "{error}");
-        assert_eq!(names(&out), ["second.npy"]);
-    }
-
-    #[test]
-    fn a_file_where_the_folder_should_be_is_named() {
-        let root = tempfile::tempdir().unwrap();
-        let file = root.path().join("taken");
-        fs::write(&file, b"x").unwrap();
-        let error = OutputDir::create(&file).unwrap_err();
-        assert!(
-            line(&error).ends_with("taken: found a file, expected a folder for the results"),
-            "{error}"
-        );
-        let error = OutputDir::create(&file.join("sub/out")).unwrap_err();
-        assert!(
-            line(&error).ends_with("taken: found a file, expected a folder for the results"),
-            "{error}"
-        );
-        assert_eq!(names(root.path()), ["taken"]);
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn a_folder_keeps_no_file_open_however_many_it_takes() {
-        let open = |folder: &Path| {
-            let files = fs::read_dir("/proc/self/fd").unwrap().filter_map(Result::ok);
-            files
-                .filter_map(|fd| fs::read_link(fd.path()).ok())
-                .filter(|to| to.starts_with(folder))
-                .count()
-        };
-        let root = tempfile::tempdir().unwrap();
-        let mut dir = OutputDir::create(root.path()).unwrap();
-        for n in 0..20 {
-            dir.write(&format!("{n}.png"), b"x").unwrap();
-            assert_eq!(open(root.path()), 0, "after {n}");
-        }
-        assert_eq!(dir.commit().unwrap().len(), 20);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn results_can_be_read_by_others_as_far_as_the_umask_says() {
-        use std::os::unix::fs::PermissionsExt;
-        let root = tempfile::tempdir().unwrap();
-        let (plain, ours) = (root.path().join("plain"), root.path().join("ours"));
-        fs::write(&plain, b"x").unwrap();
-        write_atomic(&ours, b"x").unwrap();
-        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
-        assert_eq!(mode(&ours), mode(&plain));
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn a_folder_that_takes_no_files_is_named_with_the_reason() {
-        // A program cannot make a file in /proc, not even as root.
-        let error = write_atomic(Path::new("/proc/image.npy"), b"x").unwrap_err();
-        assert!(line(&error).starts_with("/proc/image.npy: cannot write it: "), "{error}");
-        assert!(!error.to_string().contains(STAGED_PREFIX), "{error}");
-        let error = OutputDir::create(Path::new("/proc/out")).unwrap_err();
-        assert!(line(&error).starts_with("/proc/out: cannot create it: "), "{error}");
-    }
-
-    #[test]
-    fn one_file_is_whole_or_not_there() {
-        let root = tempfile::tempdir().unwrap();
-        let path = root.path().join("rec.npy");
-        write_atomic(&path, b"abc").unwrap();
-        write_atomic(&path, b"defg").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"defg");
-        assert_eq!(names(root.path()), ["rec.npy"]);
-
-        let error = write_atomic(&root.path().join("none/rec.npy"), b"x").unwrap_err();
-        assert!(
-            line(&error).ends_with("none: cannot write to it: no such file or folder"),
-            "{error}"
-        );
-        let error = write_atomic(root.path(), b"x").unwrap_err();
-        assert!(line(&error).contains("found a folder, expected a file to write"), "{error}");
-    }
-}
+mod tests;

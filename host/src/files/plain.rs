@@ -1,6 +1,7 @@
 //! Opens plain files, reads text, and tells kinds of files apart.
 
 use super::FileError;
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -32,17 +33,20 @@ const MAX_TEXT_MIB: u64 = 4;
 /// 84 MB.
 const MAX_LARGE_TEXT_MIB: u64 = 256;
 
-/// Reads a plain text file of at most 4 MiB. Every error names the path.
-pub(super) fn read_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
+/// Reads a plain text file of at most 4 MiB, by [`decode`]. Every error names the path.
+pub(crate) fn read_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_TEXT_MIB)?;
-    String::from_utf8(bytes).map_err(|_| FileError::kind(path, "a binary file", expected))
+    decode(bytes).map_err(|NotText(found)| FileError::kind(path, found, expected))
 }
 
-/// Reads a plain text file of at most 256 MiB. Every error names the path. A heading may be in
-/// another code page than UTF-8.
+/// Reads a plain text file of at most 256 MiB, by [`decode`]. Every error names the path. A heading
+/// may be in another code page than UTF-8.
 pub(super) fn read_large_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_LARGE_TEXT_MIB)?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    match UTF_16_MARKS.iter().any(|mark| bytes.starts_with(mark)) {
+        true => decode(bytes).map_err(|NotText(found)| FileError::kind(path, found, expected)),
+        false => Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned())),
+    }
 }
 
 /// The largest file that [`read_small`] reads. The bitstream of the largest ECP5 has 2 MB.
@@ -55,6 +59,14 @@ const MAX_SMALL_BYTES: u64 = 32 << 20;
 /// The system's error; [`ErrorKind::InvalidInput`](std::io::ErrorKind::InvalidInput) for anything
 /// but a file of that size.
 pub fn read_small(path: &Path) -> std::io::Result<Vec<u8>> {
+    read_at_most(path, MAX_SMALL_BYTES)
+}
+
+/// As [`read_small`], with another limit.
+///
+/// # Errors
+/// As [`read_small`].
+pub fn read_at_most(path: &Path, most_bytes: u64) -> std::io::Result<Vec<u8>> {
     use std::io::{Error, ErrorKind};
     let metadata = std::fs::metadata(path)?;
     if metadata.is_dir() {
@@ -64,12 +76,84 @@ pub fn read_small(path: &Path) -> std::io::Result<Vec<u8>> {
         return Err(Error::new(ErrorKind::InvalidInput, "a device or pipe, expected a file"));
     }
     let mut bytes = Vec::new();
-    File::open(path)?.take(MAX_SMALL_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MAX_SMALL_BYTES {
-        let reason = format!("more than {} MiB", MAX_SMALL_BYTES >> 20);
+    // A file may grow meanwhile.
+    if metadata.len() <= most_bytes {
+        File::open(path)?.take(most_bytes + 1).read_to_end(&mut bytes)?;
+    }
+    if metadata.len().max(bytes.len() as u64) > most_bytes {
+        let reason = match most_bytes >> 20 {
+            0 => format!("more than {most_bytes} bytes"),
+            mebibytes => format!("more than {mebibytes} MiB"),
+        };
         return Err(Error::new(ErrorKind::InvalidInput, reason));
     }
     Ok(bytes)
+}
+
+/// The text of a file that [`read_small`] reads, by [`decode`].
+///
+/// # Errors
+/// As [`read_small`]; [`ErrorKind::InvalidData`](std::io::ErrorKind::InvalidData) for a file that is
+/// not text.
+pub fn read_small_text(path: &Path) -> std::io::Result<String> {
+    use std::io::{Error, ErrorKind};
+    decode(read_small(path)?)
+        .map_err(|NotText(found)| Error::new(ErrorKind::InvalidData, format!("it is {found}")))
+}
+
+/// What is found in place of text, for an error message.
+#[derive(Debug)]
+struct NotText(&'static str);
+
+/// The byte-order mark of a text, which programs on Windows write.
+const MARK: char = '\u{feff}';
+/// [`MARK`] in UTF-16, the low byte first and the high byte first.
+const UTF_16_MARKS: [[u8; 2]; 2] = [[0xff, 0xfe], [0xfe, 0xff]];
+
+/// The text of these bytes, without its byte-order mark: UTF-16 where they begin with the mark of
+/// UTF-16 (what `>` writes in Windows PowerShell 5.1, and Excel's "Unicode text"), else UTF-8.
+fn decode(bytes: Vec<u8>) -> Result<String, NotText> {
+    let Some(order) = UTF_16_MARKS.iter().position(|mark| bytes.starts_with(mark)) else {
+        let text = String::from_utf8(bytes);
+        return text.map(without_mark).map_err(|_| NotText("a binary file"));
+    };
+    let (pairs, []) = bytes[2..].as_chunks::<2>() else {
+        return Err(NotText("text in UTF-16 that ends within a character"));
+    };
+    let units = pairs.iter().map(|&pair| match order {
+        0 => u16::from_le_bytes(pair),
+        _ => u16::from_be_bytes(pair),
+    });
+    let text = char::decode_utf16(units).collect::<Result<String, _>>();
+    text.map_err(|_| NotText("a binary file that begins as text in UTF-16 does"))
+}
+
+/// The text that a file with these first bytes begins with, if the file is text.
+pub(super) fn start_of_text(start: &[u8]) -> Cow<'_, [u8]> {
+    if UTF_16_MARKS.iter().any(|mark| start.starts_with(mark)) {
+        let text = decode(start[..start.len() & !1].to_vec()).unwrap_or_default();
+        return Cow::Owned(text.into_bytes());
+    }
+    Cow::Borrowed(start.strip_prefix(MARK.to_string().as_bytes()).unwrap_or(start))
+}
+
+fn without_mark(text: String) -> String {
+    match text.strip_prefix(MARK) {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    }
+}
+
+/// Whether these words of a text's first line are the names of its columns: each begins with what
+/// no number begins with, and one has a letter. A first number that cannot be read is then an
+/// error, and is not left out as a heading.
+pub(super) fn is_heading<'w>(words: impl Iterator<Item = &'w str> + Clone) -> bool {
+    let begins_as_number =
+        |word: &str| word.starts_with(|c: char| c.is_ascii_digit() || "+-.,".contains(c));
+    let mut names = words.clone().map(|word| word.trim_start_matches(['"', ' ']));
+    let mut letters = words.flat_map(str::chars);
+    names.all(|word| word.parse::<f64>().is_err() && !begins_as_number(word))
+        && letters.any(char::is_alphabetic)
 }
 
 fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<u8>, FileError> {
@@ -101,4 +185,59 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         .iter()
         .find(|(magic, _)| start.starts_with(magic))
         .map_or("a file of another kind", |&(_, kind)| kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::testing::file;
+    use proptest::prelude::*;
+
+    fn utf_16(text: &str, bytes_of: fn(u16) -> [u8; 2]) -> Vec<u8> {
+        format!("{MARK}{text}").encode_utf16().flat_map(bytes_of).collect()
+    }
+
+    proptest! {
+        /// A law of every reader of text, because all of them read by these two functions.
+        #[test]
+        fn text_is_the_same_with_a_mark_and_in_utf_16(text in "[^\u{feff}]\\PC{0,40}") {
+            let marked = format!("{MARK}{text}").into_bytes();
+            for bytes in [
+                text.clone().into_bytes(),
+                marked,
+                utf_16(&text, u16::to_le_bytes),
+                utf_16(&text, u16::to_be_bytes),
+            ] {
+                let (_folder, path) = file("a.txt", &bytes);
+                prop_assert_eq!(&read_text(&path, "text").unwrap(), &text);
+                prop_assert_eq!(&read_large_text(&path, "text").unwrap(), &text);
+                prop_assert_eq!(&read_small_text(&path).unwrap(), &text);
+            }
+        }
+    }
+
+    #[test]
+    fn what_begins_as_utf_16_and_is_not_is_refused() {
+        for (bytes, found) in [
+            (&b"\xff\xfe1\x002"[..], "ends within a character"),
+            (b"\xfe\xff\xd8\x00\x00a", "a binary file that begins as text in UTF-16"),
+            (b"\xc3\x28", "a binary file"),
+        ] {
+            let (_folder, path) = file("a.txt", bytes);
+            let message = read_text(&path, "text").unwrap_err().to_string();
+            assert!(message.contains(found), "{message}");
+            let message = read_small_text(&path).unwrap_err().to_string();
+            assert!(message.contains(found), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_cannot_be_read_is_no_heading() {
+        for heading in ["place,ml", "\"U in V\",t", "µs,y", "(mm),ml", "T,#"] {
+            assert!(is_heading(heading.split(',')), "{heading}");
+        }
+        for numbers in ["1.5", "1.5.2", "8 ml,left", "-,left", "--,..", "left,8", "nan,x", "#,#"] {
+            assert!(!is_heading(numbers.split(',')), "{numbers}");
+        }
+    }
 }

@@ -22,7 +22,7 @@
 //! (`tests::what_is_saved_is_read_back`).
 
 use super::FileError;
-use super::output::write_atomic;
+use super::output::keep;
 use super::plain::read_text;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -269,7 +269,7 @@ pub fn save(file: &Path, path: &[String], used: &[Used]) -> Result<(), FileError
     parse(file, &before)?;
     let after = replaced(&before, &path.join("."), used);
     parse(file, &after)?;
-    write_atomic(file, after.as_bytes())
+    keep(file, after.as_bytes())
 }
 
 /// The text with this section in place of the old one, or at the end.

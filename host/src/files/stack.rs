@@ -10,7 +10,7 @@ use super::image::{
     FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, provenance_of, read_grey,
 };
 use super::npy;
-use super::output::{OutputDir, write_atomic};
+use super::output::{Existing, OutputDir, write_result};
 use crate::picture::{Panel, Pictures, Sheet, SideBySide, Unit};
 use crate::provenance::{Provenance, Taken};
 use std::path::{Path, PathBuf};
@@ -222,11 +222,12 @@ impl ImageStack {
     }
 
     /// The form of the results: an array for `.npy`, one picture for `.png`, else a folder of
-    /// pictures.
+    /// pictures. With `overwrite`, a file that is there is replaced, but none of the images.
     ///
     /// # Errors
-    /// [`StackError::OnePicture`] for one picture and several images.
-    pub fn target(&self, out: &Path) -> Result<StackTarget> {
+    /// [`StackError::OnePicture`] for one picture and several images; [`StackError::File`] if a
+    /// result has the name of a file that stays.
+    pub fn target(&self, out: &Path, overwrite: bool) -> Result<StackTarget> {
         let shape = match self.form {
             Form::Array { is_single: true } => None,
             Form::Array { is_single: false } | Form::Pictures(_) => Some(self.count),
@@ -250,7 +251,15 @@ impl ImageStack {
             true => Shown::Single(Panel::square("input", self.width, &self.values, Unit::OfWhite)),
             false => Shown::Many,
         };
-        Ok(StackTarget { path: out.to_owned(), kind, input })
+        let (path, source) = (out.to_owned(), self.path.clone());
+        let target = StackTarget { path, kind, input, source, overwrite };
+        match &target.kind {
+            Kind::Folder(names) => {
+                OutputDir::create(out)?.check(names.iter().map(String::as_str))?;
+            }
+            Kind::Array(_) | Kind::Picture => target.existing().check(out)?,
+        }
+        Ok(target)
     }
 }
 
@@ -260,6 +269,9 @@ pub struct StackTarget {
     path: PathBuf,
     kind: Kind,
     input: Shown,
+    /// Where the images are that the results are made of.
+    source: PathBuf,
+    overwrite: bool,
 }
 
 /// What a picture shows beside the results: the image itself, if there is one.
@@ -278,19 +290,20 @@ enum Kind {
 }
 
 impl StackTarget {
+    fn existing(&self) -> Existing<'_> {
+        Existing::of(self.overwrite, Some(&self.source))
+    }
+
     /// Writes images of `side` x `side` with values in [0, 1].
     ///
     /// # Errors
     /// [`StackError::File`] if the images cannot be written.
     pub fn write(&self, side: usize, values: &[f32], provenance: &Provenance) -> Result<()> {
+        let write = |bytes: &[u8]| write_result(&self.path, self.existing(), bytes);
         match &self.kind {
-            Kind::Array(Some(count)) => {
-                write_atomic(&self.path, &npy::encode(&[*count, side, side], values))?;
-            }
-            Kind::Array(None) => write_atomic(&self.path, &npy::encode(&[side, side], values))?,
-            Kind::Picture => {
-                write_atomic(&self.path, &encode_grey(side, side, values, provenance))?;
-            }
+            Kind::Array(Some(count)) => write(&npy::encode(&[*count, side, side], values))?,
+            Kind::Array(None) => write(&npy::encode(&[side, side], values))?,
+            Kind::Picture => write(&encode_grey(side, side, values, provenance))?,
             Kind::Folder(names) => {
                 let mut folder = OutputDir::create(&self.path)?;
                 for (name, image) in names.iter().zip(values.chunks_exact(side * side)) {
@@ -314,7 +327,6 @@ impl StackTarget {
         title: &str,
         provenance: &Provenance,
     ) -> Result<Pictures> {
-        self.write(side, values, provenance)?;
         let name = match self.kind {
             Kind::Folder(_) => self.path.file_name(),
             Kind::Array(_) | Kind::Picture => self.path.file_stem(),
@@ -323,6 +335,8 @@ impl StackTarget {
         let file = self.path.with_file_name(format!("{name}{FOR_PEOPLE}"));
         let mut pictures = Pictures::new(provenance);
         let named = file.display().to_string();
+        self.existing().check(&file)?;
+        self.write(side, values, provenance)?;
         match &self.input {
             Shown::Single(input) => {
                 let result = Panel::square(title, side, values, Unit::OfWhite);
@@ -336,7 +350,7 @@ impl StackTarget {
                 pictures.sheet(&named, &Sheet::new(header, side, images, Unit::OfWhite));
             }
         }
-        pictures.write_files()?;
+        pictures.write_files(self.existing())?;
         Ok(pictures)
     }
 }

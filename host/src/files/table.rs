@@ -1,10 +1,10 @@
 //! Reads a user's table of numbers: a text file of lines with fields, as a spreadsheet writes it.
 //!
 //! Fields are separated by commas, semicolons or tabs. Empty lines and lines that start with `#`
-//! are skipped. A first line without a number is a heading and is skipped too.
+//! are skipped. A first line of names is a heading and is skipped too.
 
 use super::FileError;
-use super::plain::read_text;
+use super::plain::{is_heading, read_text};
 use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "a text file with a row of numbers a line";
@@ -31,10 +31,7 @@ impl Table {
                 (at, line.split([',', ';', '\t']).map(|f| f.trim().to_owned()).collect())
             })
             .collect();
-        let is_heading = |(_, fields): &(usize, Vec<String>)| {
-            fields.iter().all(|field| field.parse::<f64>().is_err())
-        };
-        if rows.first().is_some_and(is_heading) {
+        if rows.first().is_some_and(|(_, row)| is_heading(row.iter().map(String::as_str))) {
             rows.remove(0);
         }
         Ok(Self { path: path.to_owned(), rows })
@@ -67,7 +64,7 @@ impl Table {
 
     fn number(&self, line: usize, field: &str) -> Result<f64, FileError> {
         let wrong = || self.wrong(line, &format!("{field:?}"), "a number".to_owned());
-        field.parse().ok().ok_or_else(wrong)
+        field.parse().ok().filter(|number: &f64| number.is_finite()).ok_or_else(wrong)
     }
 
     fn wrong(&self, line: usize, found: &str, expected: String) -> FileError {
@@ -101,7 +98,16 @@ mod tests {
         let (_folder, path) = file("a.csv", b"1,8\n2,3,4\n");
         let message = line(&Table::read(&path).unwrap().pairs("mm, drops").unwrap_err(), "a.csv");
         assert!(message.contains("3 fields in line 2, expected 2: mm, drops"), "{message}");
-        let (_folder, path) = file("a.csv", b"\xff\xfe");
+        for (content, found) in [
+            (&b"1.5.2\n2\n"[..], "\"1.5.2\" in line 1"),
+            (b"8 ml\n2\n", "\"8 ml\" in line 1"),
+            (b"ml\ninf\n", "\"inf\" in line 2"),
+        ] {
+            let (_folder, path) = file("a.csv", content);
+            let message = line(&Table::read(&path).unwrap().last_column().unwrap_err(), "a.csv");
+            assert!(message.contains(found), "{message}");
+        }
+        let (_folder, path) = file("a.csv", b"\xc3\x28");
         assert!(line(&Table::read(&path).unwrap_err(), "a.csv").contains("a binary file"));
     }
 }

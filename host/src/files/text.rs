@@ -11,7 +11,7 @@
 
 use super::FileError;
 use super::fields::{EXPECTED, Field};
-use super::plain::read_large_text;
+use super::plain::{is_heading, read_large_text, start_of_text};
 use std::path::Path;
 
 /// Words for a reading that was not taken.
@@ -27,7 +27,7 @@ pub(super) enum Numbers {
 
 /// Whether a file with these first bytes is text.
 pub(super) fn is_start(start: &[u8]) -> bool {
-    let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+    let text = &*start_of_text(start);
     !text.is_empty() && text.iter().all(|&b| b >= b' ' && b != 0x7f || b"\t\r\n".contains(&b)) && {
         let first = text.iter().position(|b| !b.is_ascii_whitespace());
         first.is_some_and(|at| text[at].is_ascii_alphanumeric() || b"#+-.\"%_".contains(&text[at]))
@@ -37,7 +37,6 @@ pub(super) fn is_start(start: &[u8]) -> bool {
 /// Reads a file. With `decimal_comma`, every comma is a decimal comma.
 pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Numbers, FileError> {
     let text = read_large_text(path, EXPECTED)?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let lines: Vec<(usize, &str)> = text
         .lines()
         .enumerate()
@@ -48,12 +47,12 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Numbers, FileErro
     let wrong = |line: usize, found: String, expected: &str| {
         FileError::field(path, "table", format!("has {found} in line {line}"), expected)
     };
-    let is_heading = |(_, line): &(usize, &str)| {
-        let mut words = line.split([',', ';', '\t', ' ']).filter(|word| !word.is_empty());
-        words.all(|word| parse(word, '.').is_none())
+    let names_columns = |(_, line): &(usize, &str)| {
+        let words = line.split([',', ';', '\t', ' ']).filter(|word| !word.is_empty());
+        is_heading(words.clone()) && words.clone().all(|word| parse(word, '.').is_none())
     };
     let (heading, body) = match lines.split_first() {
-        Some((first, body)) if is_heading(first) => (Some(first.1), body),
+        Some((first, body)) if names_columns(first) => (Some(first.1), body),
         _ => (None, &lines[..]),
     };
     if body.is_empty() {
@@ -231,6 +230,17 @@ mod tests {
     }
 
     #[test]
+    fn text_in_utf_16_is_known_by_its_beginning() {
+        let text = "\u{feff}d\r\n1,5\r\n";
+        for bytes_of in [u16::to_le_bytes, u16::to_be_bytes] {
+            let bytes: Vec<u8> = text.encode_utf16().flat_map(bytes_of).collect();
+            // Only the first bytes of a file are looked at, which may end within a character.
+            assert!(is_start(&bytes) && is_start(&bytes[..7]), "{bytes:?}");
+        }
+        assert!(is_start(b"\xef\xbb\xbf1\n") && !is_start(b"\xff\xfe\x01\x00\x02\x00"));
+    }
+
+    #[test]
     fn a_decimal_comma_is_seen_where_the_file_shows_it_and_asked_for_where_not() {
         assert_eq!(table("0,5\n0,05\n").1, [0.5, 0.05]);
         assert_eq!(table("1,5E-3\n2,5E-3\n").1, [0.0015, 0.0025]);
@@ -265,6 +275,7 @@ mod tests {
             ("1 2\n3\n", "1 numbers in line 2"),
             ("a b\n", "without numbers"),
             ("1,2;x\n", "\"x\" in line 1"),
+            ("1.5.2\n2\n3\n", "\"1.5.2\" in line 1"),
         ] {
             let (_folder, path) = file("y.txt", content.as_bytes());
             let message = line(&read(&path, false).err().unwrap(), "y.txt");

@@ -9,7 +9,7 @@ use super::scale::{PERCENTILES, Range, Scale, Unit};
 use super::sheet::Sheet;
 use super::video;
 use crate::files::FileError;
-use crate::files::output::{OutputDir, write_atomic};
+use crate::files::output::{Existing, OutputDir, write_result};
 use crate::provenance::Provenance;
 use nirspi_recon::Image;
 use serde::Serialize;
@@ -178,8 +178,9 @@ impl Pictures {
     ///
     /// # Errors
     /// [`FileError`] names the file and the system's reason.
-    pub fn write_files(&self) -> Result<(), FileError> {
-        self.entries.iter().try_for_each(|entry| write_atomic(Path::new(&entry.file), &entry.bytes))
+    pub fn write_files(&self, existing: Existing<'_>) -> Result<(), FileError> {
+        let write = |entry: &Entry| write_result(Path::new(&entry.file), existing, &entry.bytes);
+        self.entries.iter().try_for_each(write)
     }
 }
 

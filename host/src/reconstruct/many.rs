@@ -163,8 +163,9 @@ fn images_of(
             report,
             outliers: source.outliers.iter().map(OutlierReport::of).collect(),
             notes: losses(&source).chain(source.notes.iter().cloned()).collect(),
+            // The frames of one recording lack the same.
+            warnings: if index == 0 { source.all_warnings() } else { source.warnings },
             taken: source.taken,
-            warnings: source.warnings,
         })
     };
     sources.into_iter().enumerate().map(image).collect()

@@ -87,7 +87,8 @@ pub struct OneReport {
 }
 
 impl OneReport {
-    /// The report in words, a line each: measurements, losses, method, enhancement and its warnings.
+    /// The report in words, a line each: measurements, losses, method, enhancement. Its warnings are
+    /// [`all_warnings`](Self::all_warnings).
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let Self { input, n, used, .. } = self;
@@ -115,10 +116,14 @@ impl OneReport {
         }));
         if let Some(enhancement) = &self.enhancement {
             lines.push(enhancement.line());
-            lines.extend(enhancement.warnings.iter().map(|warning| format!("warning: {warning}")));
         }
-        lines.extend(self.warnings.iter().map(|warning| format!("warning: {warning}")));
         lines
+    }
+
+    /// What a user must know of the images: of the networks, and of the readings.
+    pub fn all_warnings(&self) -> impl Iterator<Item = &String> {
+        let enhanced = self.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
+        enhanced.chain(&self.warnings)
     }
 }
 
@@ -164,6 +169,11 @@ pub fn one_image(
     } else {
         (None, None)
     };
+    let mut warnings = source.all_warnings();
+    // A named form of the readings says more.
+    if source.warnings.is_empty() {
+        warnings.extend(method.doubt(&source.measurements));
+    }
     let unit = Unit::of_readings(source.frames.is_some());
     let short = enhancement.as_ref().map(|enhancement| enhancement.short.clone());
     let dropouts = source.dropouts.into_iter().map(|d| DropoutReport {
@@ -172,11 +182,6 @@ pub fn one_image(
         rows: d.rows,
     });
     let provenance = source.taken.made(request.made);
-    let mut warnings = source.warnings;
-    // A named form of the readings says more.
-    if warnings.is_empty() {
-        warnings.extend(method.doubt(&source.measurements));
-    }
     let report = OneReport {
         pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short), &provenance),
         input: request.input.to_owned(),

@@ -1,12 +1,14 @@
 //! Repairs a damaged recording into a new file.
 
-use super::{Recorder, Recording, RecordingError, RunAccount, Target};
+use super::{Book, Opening, Recording, RecordingError, RunAccount};
 use crate::account::LossCounters;
+use crate::files::FileError;
+use crate::files::output::{Existing, write_in_pieces};
 use crate::tally::hear_recording;
 use nirspi_recon::words::count;
 use serde::Serialize;
 use std::fmt;
-use std::io;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -50,41 +52,34 @@ pub enum RecoverError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// The new file cannot be written.
-    #[error("{path}: cannot write the recovered recording")]
-    Write {
-        /// The new file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
-/// Copies every packet that can be read into a new recording, with its time. The account of the new
-/// recording says what is missing.
+/// Copies every packet that can be read into a new recording, with its time, which is whole or not
+/// made. The account of the new recording says what is missing. With `overwrite`, a file of the name
+/// `out` is replaced, but never the damaged recording itself.
 ///
 /// # Errors
 /// [`RecoverError`] if the recording has no setup any more, or the new file exists or cannot be
-/// written. A new file that was not finished is removed.
-pub fn recover(path: &Path, target: &Target) -> Result<Recovered, RecoverError> {
+/// written.
+pub fn recover(path: &Path, out: &Path, overwrite: bool) -> Result<Recovered, RecoverError> {
+    write_in_pieces(out, Existing::of(overwrite, Some(path)), |file| copy(path, file, out))
+}
+
+fn copy(path: &Path, file: impl Write, out: &Path) -> Result<Recovered, RecoverError> {
     let mut recording = Recording::open(path)?;
-    let write = |source| RecoverError::Write { path: target.path().to_owned(), source };
+    let write = |error| FileError::io(out, "write", error);
     let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
     let (identity, run) = (recording.identity.clone(), recording.run);
-    let mut recorder =
-        Recorder::create(target, &identity, &setup, settling.as_ref(), run).map_err(write)?;
-    let copied = hear_recording(&mut recording, |heard, tally| {
-        recorder
-            .packet_of(heard.time_ns, heard.raw)
-            .and_then(|()| recorder.heard(heard.content, tally))
-            .map_err(write)
-    });
-    let mut tally = match copied {
-        Ok(tally) => tally,
-        Err(error) => {
-            recorder.discard();
-            return Err(error);
-        }
-    };
+    let (identity, setup, settling) = (&identity, &setup, settling.as_ref());
+    let opening = Opening { identity, setup, settling, run, provenance: None };
+    let mut book = Book::begin(file, &opening).map_err(write)?;
+    let mut tally = hear_recording(&mut recording, |heard, tally| {
+        book.packet(heard.time_ns, heard.raw)
+            .and_then(|()| book.heard(heard.time_ns, heard.content, tally))
+            .map_err(|error| RecoverError::from(write(error)))
+    })?;
     let end = recording.end().clone();
     let old = end.account.clone().unwrap_or_default();
     if let (Some(made), false) =
@@ -103,11 +98,10 @@ pub fn recover(path: &Path, target: &Target) -> Result<Recovered, RecoverError> 
             RunAccount { counters: frames, asked: old.asked, made, missing }
         }
     };
-    let recording =
-        recorder.finish(&account).map_err(|(path, source)| RecoverError::Write { path, source })?;
+    book.end(Some(&account)).map_err(write)?;
     let received = end.account.as_ref().map(|account| account.counters.received);
     Ok(Recovered {
-        recording,
+        recording: out.to_owned(),
         packets: end.packets,
         frames,
         frames_lost: received.map(|received| received.saturating_sub(frames.received)),

@@ -68,6 +68,8 @@ pub struct Damage {
     pub checksum: bool,
     /// Whether the file ends early.
     pub is_cut: bool,
+    /// Place at which another recording begins, behind the end of this one.
+    pub another: Option<u64>,
 }
 
 impl std::fmt::Display for Damage {
@@ -85,6 +87,9 @@ impl std::fmt::Display for Damage {
         }
         if self.is_cut {
             parts.push("the file ends early".to_owned());
+        }
+        if let Some(place) = self.another {
+            parts.push(format!("another recording begins at byte {place}"));
         }
         f.write_str(&parts.join("; "))
     }
@@ -189,9 +194,8 @@ impl Scan {
     pub(super) fn next(&mut self) -> io::Result<Option<Entry>> {
         while !self.over {
             if self.footer {
-                let is_whole = self.peek(MAGIC.len())? == MAGIC;
-                self.damage.is_cut |= !is_whole;
                 self.over = true;
+                self.end()?;
                 break;
             }
             if !self.is_believed(false)? {
@@ -205,6 +209,29 @@ impl Scan {
             }
         }
         Ok(None)
+    }
+
+    /// Reads what stands behind the last record: the closing magic, and nothing else in a whole file.
+    fn end(&mut self) -> io::Result<()> {
+        if self.peek(MAGIC.len())? != MAGIC {
+            self.damage.is_cut = true;
+            return Ok(());
+        }
+        self.advance(MAGIC.len());
+        let end = self.position;
+        self.damage.another = (self.peek(MAGIC.len())? == MAGIC).then_some(end);
+        loop {
+            match self.peek(BLOCK)?.len() {
+                0 => break,
+                length => self.advance(length),
+            }
+        }
+        if self.position > end {
+            self.damage.places += 1;
+            self.damage.bytes += self.position - end;
+            self.damage.first.get_or_insert(end);
+        }
+        Ok(())
     }
 
     /// Passes over bytes up to the next record that can be believed. False at the end of the file.

@@ -88,17 +88,9 @@ impl Recorder {
     /// If the disk is full or gone.
     pub fn packet(&mut self, raw: &[u8]) -> io::Result<()> {
         let age = u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX);
-        self.packet_of(self.epoch.saturating_add(age), raw)?;
+        self.newest = self.epoch.saturating_add(age);
+        self.book.packet(self.newest, raw)?;
         self.flush_if_due()
-    }
-
-    /// Appends one packet that was received at this time of the host's clock, in ns.
-    ///
-    /// # Errors
-    /// If the disk is full or gone.
-    pub(crate) fn packet_of(&mut self, time_ns: u64, raw: &[u8]) -> io::Result<()> {
-        self.newest = time_ns;
-        self.book.packet(time_ns, raw)
     }
 
     /// Writes what the newest packet means into the channels of log and telemetry. `tally` has

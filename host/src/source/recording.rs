@@ -67,16 +67,15 @@ fn of_frames(
     let Recording { setup, settling, .. } = recording;
     let End { cut_short, account, .. } = recording.end();
     let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
-    if let Some(reason) = cut_short {
-        notes.push(format!("the recording is cut short or damaged: {reason}"));
-    }
+    let mut lacks = Vec::new();
+    lacks.extend(cut_short.as_ref().map(|reason| format!("cut short or damaged: {reason}")));
     if let Some(account) = account {
         if account.counters != counters {
-            notes.push("the frames found are not those that the capture counted".to_owned());
+            lacks.push(format!("the capture had {}", account.counters));
         }
-        notes.extend(account.missing.as_deref().map(not_whole));
+        lacks.extend(account.missing.clone());
     }
-    notes.extend(tally.misfit().map(|misfit| format!("some frames are left out: {misfit}")));
+    lacks.extend(tally.misfit().map(|misfit| format!("some frames are left out: {misfit}")));
     if settling.is_none() {
         notes.push(NOT_CALIBRATED.to_owned());
     }
@@ -96,6 +95,7 @@ fn of_frames(
         reference,
         frames,
         taken: Taken::by(&recording.identity).from_file(path),
+        damage: (!lacks.is_empty()).then(|| not_whole(counters, &lacks)),
         warnings: read.doubts.iter().map(ToString::to_string).collect(),
         notes,
         flat_field,

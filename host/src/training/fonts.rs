@@ -5,8 +5,8 @@
 //! A font gives either all 62 characters or none, because networks would learn the boxes of missing
 //! characters (`tests::a_font_that_lacks_one_character_gives_none`).
 
-use crate::files::FileError;
 use crate::files::characters::{GLYPH_PX, entries, refused};
+use crate::files::{FileError, read_small};
 use ab_glyph::{Font as _, FontVec, GlyphId, PxScale, point};
 use nirspi_nets::data::{AREA_PX, CHARACTERS, Kind, SIDE_PX, Stack};
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ pub fn render(folder: &Path) -> Result<Rendered, FileError> {
         .par_iter()
         .enumerate()
         .map(|(number, file)| {
-            let bytes = std::fs::read(file).map_err(|error| FileError::io(file, "read", error))?;
+            let bytes = read_small(file).map_err(|error| FileError::io(file, "read", error))?;
             let font = FontVec::try_from_vec(bytes).ok();
             Ok(font.and_then(|font| alphabet(&font, SIZES_PX[number % SIZES_PX.len()])))
         })

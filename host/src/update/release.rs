@@ -6,8 +6,8 @@
 
 use super::UpdateError;
 use crate::boards::BOARDS;
-use crate::files::FileError;
 use crate::files::output::OutputDir;
+use crate::files::{FileError, read_at_most, read_text};
 use crate::versions::of_register;
 use nirspi_mcu::staging;
 use nirspi_wire::{register::Register, version};
@@ -16,6 +16,9 @@ use sha2::{Digest, Sha256};
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// The largest file of a release that is read: firmware with all its debug information.
+const MAX_BYTES: u64 = 256 << 20;
 
 /// Name of the manifest in a release folder.
 pub const MANIFEST: &str = "release.json";
@@ -102,8 +105,7 @@ impl Release {
         if !manifest.is_file() {
             return Err(UpdateError::NoManifest(path.to_owned()));
         }
-        let text = fs::read_to_string(&manifest)
-            .map_err(|error| FileError::io(&manifest, "read", error))?;
+        let text = read_text(&manifest, "the manifest of a release")?;
         let mut release = Self { folder: folder.to_owned(), manifest: read(&manifest, &text)? };
         if !is_folder {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
@@ -133,11 +135,14 @@ impl Release {
     /// [`UpdateError`] if the file cannot be read, or is not the file that the manifest describes.
     pub fn bytes(&self, asset: &Asset) -> Result<Vec<u8>, UpdateError> {
         let path = self.path(asset);
-        let bytes = fs::read(&path).map_err(|error| FileError::io(&path, "read", error))?;
-        if bytes.len() as u64 != asset.bytes {
-            let found = bytes.len() as u64;
+        let read = |error| FileError::io(&path, "read", error);
+        let found = fs::metadata(&path).map_err(read)?;
+        // What is no file has no length.
+        if found.is_file() && found.len() != asset.bytes {
+            let found = found.len();
             return Err(UpdateError::Cut { path, found, expected: asset.bytes });
         }
+        let bytes = read_at_most(&path, MAX_BYTES).map_err(read)?;
         let found = sha256(&bytes);
         if found != asset.sha256 {
             return Err(UpdateError::Changed { path, found, expected: asset.sha256.clone() });
@@ -241,7 +246,8 @@ pub fn pack(sources: &[Source], out: &Path) -> Result<Manifest, UpdateError> {
     let mut folder = OutputDir::create(out)?;
     let mut files = Vec::new();
     for Source { path, component, board } in sources {
-        let bytes = fs::read(path).map_err(|error| FileError::io(path, "read", error))?;
+        let read = |error| FileError::io(path, "read", error);
+        let bytes = read_at_most(path, MAX_BYTES).map_err(read)?;
         if !component.begins(&bytes) {
             return Err(UpdateError::NotOfThisKind { path: path.clone(), component: *component });
         }

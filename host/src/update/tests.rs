@@ -105,8 +105,17 @@ fn a_file_that_is_cut_or_changed_is_refused() {
     damaged.truncate(4000);
     fs::write(&file, &damaged).unwrap();
     assert!(refusal(&release, &camera).contains("ecp5-evn.bit: 4000 bytes, expected 5042"));
+    // A file of twenty gigabytes, of which nothing is read.
+    fs::File::options().write(true).open(&file).unwrap().set_len(20 << 30).unwrap();
+    assert!(refusal(&release, &camera).contains("21474836480 bytes, expected 5042"));
     fs::remove_file(&file).unwrap();
     assert!(refusal(&release, &camera).contains("ecp5-evn.bit: cannot read it"));
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("/dev/zero", &file).unwrap();
+        let told = refusal(&release, &camera);
+        assert!(told.contains("ecp5-evn.bit: cannot read it: a device or pipe"), "{told}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Reads a camera description by the name of a shipped camera, or from a TOML file.
 
-use crate::files::read_small;
+use crate::files::read_small_text;
 use nirspi_optics::{CameraModel, CameraModelError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -44,15 +44,10 @@ pub fn read_camera_model(name_or_file: &str) -> Result<CameraModel, CameraFileEr
         return Ok(camera);
     }
     let path = Path::new(name_or_file);
-    let text = read_small(path)
-        .and_then(|bytes| {
-            String::from_utf8(bytes)
-                .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
-        })
-        .map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => CameraFileError::Unknown(name_or_file.to_owned()),
-            _ => CameraFileError::Read { path: path.to_owned(), source },
-        })?;
+    let text = read_small_text(path).map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => CameraFileError::Unknown(name_or_file.to_owned()),
+        _ => CameraFileError::Read { path: path.to_owned(), source },
+    })?;
     let content = |problem| CameraFileError::Content { path: path.to_owned(), problem };
     CameraModel::parse(&text).map_err(content)
 }

@@ -1,10 +1,10 @@
 //! `nirspi bench omp`: times sparse representations of many frames.
 
-use crate::report::ReportArgs;
+use crate::report::{Overwrite, ReportArgs};
 use crate::{backend, print, provenance, refused};
 use anyhow::{Context, Result};
 use clap::{ValueEnum, builder::RangedU64ValueParser};
-use nirspi::files::output::write_atomic;
+use nirspi::files::output::{Existing, write_result};
 use nirspi::files::problem;
 use nirspi_eval::bench::omp::{self, Settings};
 use nirspi_recon::omp::Backend;
@@ -28,6 +28,8 @@ pub struct Args {
     /// File for the solution: `support` (B x k) and `coef`
     #[arg(long, value_name = "NPZ")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
     /// Measurements of a frame, of 1024
     #[arg(long, value_name = "M", default_value_t = 512)]
     measurements: usize,
@@ -64,6 +66,8 @@ enum Precision {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    let existing = Existing::of(args.overwrite.overwrite, args.input.as_deref());
+    args.out.as_ref().map_or(Ok(()), |out| existing.check(out))?;
     let problem = match &args.input {
         Some(path) => problem::read(path)?,
         None => omp::random_problem(args.measurements, args.sparsity, args.frames, args.seed)
@@ -100,7 +104,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(out) = &args.out {
         let solutions: Vec<(&[usize], &[f64])> =
             report.solutions.iter().map(|s| (&s.support[..], &s.coefficients[..])).collect();
-        write_atomic(out, &problem::encode(out, problem.sparsity, &solutions)?)?;
+        write_result(out, existing, &problem::encode(out, problem.sparsity, &solutions)?)?;
     }
     print::json(&report, &provenance::computed())?;
     Ok(ExitCode::SUCCESS)

@@ -61,6 +61,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    OutputDir::create(&args.out)?.check(["quality.json"])?;
     let study = Study::new(Settings {
         data: args.data.clone(),
         held_out: args.held_out.clone(),

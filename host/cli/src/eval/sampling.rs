@@ -43,6 +43,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    OutputDir::create(&args.out)?.check(["sampling.json"])?;
     let orders = args
         .orders
         .iter()

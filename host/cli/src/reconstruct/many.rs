@@ -96,7 +96,7 @@ fn say(args: &Args, files: &[PathBuf], report: &Report) -> Result<()> {
         }
         let enhanced = frame.enhancement.iter().flat_map(|enhancement| &enhancement.warnings);
         for warning in enhanced.chain(&frame.warnings) {
-            print::line(format_args!("warning: {file}{at}: {warning}"))?;
+            print::warning(format_args!("{file}{at}: {warning}"));
         }
     }
     let (images, n) = (count_of(report.frames.len(), "image"), report.n);

@@ -109,7 +109,8 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
     let unit = Unit::of_readings(sources[0].frames.is_some());
     let provenance = sources[0].taken.made(made());
     let (mut images, mut given, mut frames) = (Vec::new(), Vec::new(), Vec::new());
-    for (made, (used, source)) in solved.into_iter().zip(used.iter().zip(sources)) {
+    for (at, (made, (used, source))) in solved.into_iter().zip(used.iter().zip(sources)).enumerate()
+    {
         let warm = made.report.warm;
         let Solved { mut image, with_readings, report } = args.method.solved(made, used);
         if let Some(other) = others.next() {
@@ -127,7 +128,8 @@ pub fn run(args: &Args, first: &FirstPatterns) -> Result<ExitCode> {
             enhancement: None,
             outliers: source.outliers.iter().map(OutlierReport::of).collect(),
             notes: losses(&source).chain(source.notes.iter().cloned()).collect(),
-            warnings: source.warnings,
+            // The frames of one recording lack the same.
+            warnings: if at == 0 { source.all_warnings() } else { source.warnings },
         });
     }
     let order = orders.into_iter().next().unwrap_or_default();
@@ -232,7 +234,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
             print::line(format_args!("frame {at}: {outlier}"))?;
         }
         for warning in warnings.chain(&frame.warnings) {
-            print::line(format_args!("warning: frame {at}: {warning}"))?;
+            print::warning(format_args!("frame {at}: {warning}"));
         }
         for note in &frame.notes {
             print::note(format_args!("frame {at}: {note}"))?;

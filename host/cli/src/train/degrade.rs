@@ -5,9 +5,9 @@ use crate::camera::ModelArgs;
 use crate::print;
 use crate::progress::Progress;
 use crate::provenance;
-use crate::report::ReportArgs;
+use crate::report::{Overwrite, ReportArgs};
 use anyhow::Result;
-use nirspi::files::output::write_atomic;
+use nirspi::files::output::{Existing, write_result};
 use nirspi::training::{LinearCamera, pairs};
 use nirspi_eval::train::Found;
 use nirspi_nets::data::Part;
@@ -43,6 +43,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -57,6 +59,9 @@ struct Report {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    // The scenes are in folders of pictures, whose names differ from a file of arrays.
+    let existing = Existing::of(args.overwrite.overwrite, None);
+    existing.check(&args.out)?;
     let (scenes, data) = args.data.data().scenes(args.seed)?;
     let camera = LinearCamera::new(&args.model.read()?, args.seed)?;
     let bar = Progress::of("degrade", args.count, "pairs");
@@ -65,7 +70,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let pairs = pairs::take(&scenes, part, &camera, count, args.seed, &|| bar.add(1))?;
     drop(bar);
     let provenance = provenance::simulated();
-    write_atomic(&args.out, &pairs::encode(&args.out, &scenes, &pairs, &provenance)?)?;
+    let encoded = pairs::encode(&args.out, &scenes, &pairs, &provenance)?;
+    write_result(&args.out, existing, &encoded)?;
     let report = Report {
         simulated: true,
         pairs: pairs.len(),

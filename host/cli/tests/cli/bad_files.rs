@@ -91,7 +91,7 @@ fn a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing
         if outcome.code == Some(0) {
             kept += 1;
             let report = outcome.json();
-            assert!(report["notes"][0].as_str().unwrap().contains("cut short"), "{report}");
+            assert!(report["warnings"][0].as_str().unwrap().contains("cut short"), "{report}");
             assert!(report["frames"]["received"].as_u64().unwrap() > 0, "{report}");
         } else {
             outcome.failed(1, &["cut.mcap"]);
@@ -112,7 +112,13 @@ fn a_damaged_packet_in_a_recording_costs_one_frame() {
     let report = outcome.succeeded().json();
     assert_eq!(report["frames"]["received"], 599, "{report}");
     assert_eq!(report["frames"]["corrupt"], 1, "{report}");
-    assert!(report["notes"][0].as_str().unwrap().contains("damaged"), "{report}");
+    assert!(report["warnings"][0].as_str().unwrap().contains("damaged"), "{report}");
+    // The warning is on stderr, and --quiet does not hide it.
+    let export = ["export", "rec.mcap", "--to", "npz", "--out", "x.npz", "--quiet"];
+    let outcome = bench.run(&export);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let told = ["nirspi: warning: the recording is not whole: 599 received, 0 lost, 1 corrupt"];
+    assert!(told.iter().all(|part| outcome.stderr.contains(part)), "{outcome:?}");
 }
 
 #[test]

@@ -225,12 +225,12 @@ fn incomplete(run: Run, received: u64, words: &[&str]) -> serde_json::Value {
         let again = ["reconstruct", "rec.mcap", "--method", "hadamard", "--json"];
         let again = bench.run(&again).succeeded().json();
         assert_eq!(again["frames"]["received"], received, "{again}");
-        let notes = again["notes"].as_array().unwrap();
+        let warnings = again["warnings"].as_array().unwrap();
         let told = |note: &serde_json::Value| {
             let note = note.as_str().unwrap();
             note.contains("not whole") && note.contains(words[0])
         };
-        assert!(notes.iter().any(told), "{again}");
+        assert!(warnings.iter().any(told), "{again}");
     }
     report
 }

@@ -116,6 +116,7 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
     let mut names: Vec<_> = std::fs::read_dir(bench.path("sharp"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| !name.starts_with('.'))
         .collect();
     names.sort();
     assert_eq!(names, ["a.png", "b.png"]);
@@ -183,13 +184,30 @@ fn weights_of_another_network_are_refused() {
 }
 
 #[test]
+fn no_result_replaces_its_own_input_nor_another_file_unasked() {
+    let bench = Bench::new();
+    let input = npy::encode(&[32, 32], &bar(32));
+    bench.write("in.npy", &input);
+    let deblur = |more: &[&str]| bench.run(&[&["upscale", "in.npy"][..], more].concat());
+    deblur(&["--out", "in.npy"]).failed(1, &["in.npy: is there already", "--overwrite"]);
+    let own = ["in.npy: the result is made of this file, expected another name for it"];
+    deblur(&["--out", "in.npy", "--overwrite"]).failed(1, &own);
+    assert_eq!(std::fs::read(bench.path("in.npy")).unwrap(), input);
+    deblur(&["--out", "large.npy"]).succeeded();
+    deblur(&["--out", "large.npy"]).failed(1, &["large.npy: is there already"]);
+    deblur(&["--out", "large.npy", "--overwrite"]).succeeded();
+    deblur(&["--out", "-"]).failed(1, &["-: found no name"]);
+    assert_eq!(bench.names(), ["in.npy", "large.npy", "large.picture.png"]);
+}
+
+#[test]
 fn classical_methods_deblur_too_and_what_is_the_networks_is_not_theirs() {
     let bench = Bench::new();
     bench.write("in.npy", &npy::encode(&[1, 64, 64], &bar(64)));
     for model in ["wiener", "rl", "tv"] {
         let arguments = ["deblur", "in.npy", "--model", model, "--blur-px", "1", "--noise", "0.01"];
         let report = bench
-            .run(&[&arguments[..], &["--json", "--out", "out.npy"]].concat())
+            .run(&[&arguments[..], &["--json", "--out", "out.npy", "--overwrite"]].concat())
             .succeeded()
             .json();
         assert_eq!(report["model"], model);
@@ -291,7 +309,7 @@ fn a_precision_that_does_not_exist_is_refused_and_the_processor_has_one_alone() 
     let bench = Bench::new();
     bench.write("in.npy", &npy::encode(&[32, 32], &bar(32)));
     let enhance = |precision| {
-        let usual = ["enhance", "in.npy", "--out", "out.npy", "--backend", "cpu"];
+        let usual = ["enhance", "in.npy", "--out", "out.npy", "--overwrite", "--backend", "cpu"];
         bench.run(&[&usual[..], &["--precision", precision]].concat())
     };
     enhance("f32").succeeded();

@@ -18,8 +18,9 @@ fn phantom(bench: &Bench, change: impl Fn(Vec<f32>) -> Vec<f32>) -> Measured {
 /// The lines and the report of a reconstruction, whose exit code is 0.
 fn said(bench: &Bench, more: &[&str]) -> (String, serde_json::Value) {
     let all = [&["reconstruct", "in.npy", "--shown", "natural"], more].concat();
-    let outcome = bench.run(&all).succeeded();
-    (outcome.stdout, bench.json("out/report.json"))
+    let outcome = bench.run(&all);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    (outcome.stdout + &outcome.stderr, bench.json("out/report.json"))
 }
 
 #[test]

@@ -155,7 +155,27 @@ fn a_run_that_fails_leaves_older_results_alone() {
     bench.write("in.npz", &measured.npz());
     bench.run(&["reconstruct", "in.npz"]).failed(1, &["in.npz", "`y`", "inf", "[7]"]);
     assert_eq!(std::fs::read(bench.path("out/report.json")).unwrap(), before);
-    assert_eq!(std::fs::read_dir(bench.path("out")).unwrap().count(), 3);
+    let files = ["image.npy", "image.png", "report.json", ".nirspi.json"];
+    assert!(files.iter().all(|name| bench.path(&format!("out/{name}")).is_file()));
+    assert_eq!(std::fs::read_dir(bench.path("out")).unwrap().count(), files.len());
+}
+
+#[test]
+fn results_replace_those_of_the_run_before_and_no_file_of_the_users() {
+    let (bench, measured) = (Bench::new(), Measured::new(32));
+    bench.write("in.npz", &measured.npz());
+    let there = |name: &str| bench.path(&format!("out/{name}")).exists();
+    bench.run(&["reconstruct", "in.npz", "--enhance"]).succeeded();
+    assert!(there("enhanced.npy") && there("enhanced.png"));
+    bench.run(&["reconstruct", "in.npz", "--method", "hadamard"]).succeeded();
+    assert!(there("image.npy") && !there("enhanced.npy") && !there("enhanced.png"));
+    // Readings that have the name of a result.
+    std::fs::create_dir(bench.path("mine")).unwrap();
+    bench.write("mine/image.npy", b"readings");
+    let told = ["mine/image.npy: is there already", "expected another folder for the results"];
+    bench.run(&["reconstruct", "in.npz", "--out", "mine"]).failed(1, &told);
+    assert_eq!(std::fs::read(bench.path("mine/image.npy")).unwrap(), b"readings");
+    assert_eq!(std::fs::read_dir(bench.path("mine")).unwrap().count(), 1);
 }
 
 #[test]

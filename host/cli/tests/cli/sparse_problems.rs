@@ -33,9 +33,9 @@ fn a_given_problem_is_solved_and_timed() {
     bench.write("problem.npz", &problem());
     for precision in ["auto", "f32", "f64"] {
         let arguments =
-            ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz", "--repeats", "3"];
-        let report =
-            bench.run(&[&arguments[..], &["--precision", precision]].concat()).succeeded().json();
+            ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz", "--overwrite"];
+        let further = ["--repeats", "3", "--precision", precision];
+        let report = bench.run(&[&arguments[..], &further].concat()).succeeded().json();
         assert!(report["median_ms"].as_f64().unwrap() > 0.0, "{report}");
         assert_eq!((&report["frames"], &report["atoms"]), (&2.into(), &9.into()));
         let support = array(&bench, "solution.npz", "support", |b| i64::from_le_bytes(b) as f64);

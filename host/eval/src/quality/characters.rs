@@ -6,7 +6,7 @@
 //! data under another family's name (`tests::no_held_out_image_is_one_of_training`).
 
 use crate::error::{EvalError, On, Result};
-use nirspi::files::characters;
+use nirspi::files::{characters, read_small_text};
 use nirspi_nets::HELD_OUT;
 use nirspi_nets::data::{Families, Stack};
 use rand::SeedableRng;
@@ -63,7 +63,7 @@ impl Characters {
         let groups = match held_out {
             None => groups(HELD_OUT).on(|| "held_out.json of the embedded weights".to_owned())?,
             Some(file) => {
-                let text = std::fs::read_to_string(file);
+                let text = read_small_text(file);
                 let text = text.on(|| format!("{}: cannot read it", file.display()))?;
                 groups(&text).on_file(file)?
             }

@@ -7,7 +7,7 @@
 
 use super::data::Found;
 use crate::error::{EvalError, On, Result};
-use nirspi::files::output::{OutputDir, write_atomic};
+use nirspi::files::output::{OutputDir, keep};
 use nirspi::picture::{Axis, Chart, Line, below, signed_png};
 use nirspi::provenance::Provenance;
 use nirspi_nets::train::Entry;
@@ -80,7 +80,7 @@ impl RunFolder {
             .map(|entry| Ok(serde_json::to_string(entry)? + "\n"))
             .collect::<Result<String>>()?;
         let file = self.file(Self::LOG);
-        write_atomic(&file, lines.as_bytes())?;
+        keep(&file, lines.as_bytes())?;
         let named = || format!("{}: cannot write it", file.display());
         self.log = Some(OpenOptions::new().append(true).open(&file).on(named)?);
         Ok(())
@@ -92,7 +92,7 @@ impl RunFolder {
     /// [`EvalError`] for a file that cannot be written.
     pub fn write_data(&self, data: &Found) -> Result<()> {
         let text = serde_json::to_string_pretty(data)? + "\n";
-        Ok(write_atomic(&self.file(Self::DATA), text.as_bytes())?)
+        Ok(keep(&self.file(Self::DATA), text.as_bytes())?)
     }
 
     /// Appends a line to the log.
@@ -113,10 +113,10 @@ impl RunFolder {
     /// # Errors
     /// [`EvalError`] for a file that cannot be written.
     pub fn checkpoint(&self, bytes: &[u8], log: &[Entry], provenance: &Provenance) -> Result<()> {
-        write_atomic(&self.file(Self::CHECKPOINT), bytes)?;
+        keep(&self.file(Self::CHECKPOINT), bytes)?;
         let charts: Vec<_> = plot(log).iter().map(Chart::render).collect();
         if !charts.is_empty() {
-            write_atomic(&self.file(Self::PLOT), &signed_png(&below(&charts), provenance))?;
+            keep(&self.file(Self::PLOT), &signed_png(&below(&charts), provenance))?;
         }
         Ok(())
     }
@@ -126,7 +126,7 @@ impl RunFolder {
     /// # Errors
     /// [`EvalError`] for a file that cannot be written.
     pub fn best(&self, bytes: &[u8]) -> Result<()> {
-        Ok(write_atomic(&self.file(Self::WEIGHTS), bytes)?)
+        Ok(keep(&self.file(Self::WEIGHTS), bytes)?)
     }
 }
 

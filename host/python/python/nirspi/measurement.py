@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -351,5 +352,8 @@ def _of_loaded(found: _nirspi.Loaded) -> Measurement:
     made.reference = None if references is None else references.reshape(*leading, made.n, made.n)
     made.frames = None if frames is None else Account(*frames)
     made.flat_field, made.notes = found.flat_field, found.notes
+    if found.damage is not None:
+        made.notes.insert(0, found.damage)
+        warnings.warn(found.damage, RuntimeWarning, stacklevel=3)
     made.noise = found.noise
     return made

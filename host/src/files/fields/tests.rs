@@ -30,6 +30,27 @@ fn arrays_come_out_of_each_format_as_they_went_in() {
     }
 }
 
+/// A gigabyte of numbers in a small file: of h5py a chunked array that was never written, and SciPy's
+/// array `y` with other sizes of its axes.
+#[test]
+fn bytes_that_would_become_gigabytes_of_numbers_are_refused_before_they_are_read() {
+    let mut mat = include_bytes!("../small/level5.mat").to_vec();
+    let axes = [6, 0, 0, 0, 1, 0, 0, 0];
+    let at = mat.windows(8).position(|bytes| bytes == axes).unwrap();
+    mat[at..at + 8].copy_from_slice(&[0, 0x40, 0, 0, 0, 0x20, 0, 0]);
+    for (name, bytes) in [
+        ("claims.mat", &mat[..]),
+        #[cfg(feature = "hdf5")]
+        ("claims.h5", include_bytes!("../small/claims.h5")),
+    ] {
+        let (_folder, path) = file(name, bytes);
+        let mut fields = Fields::open(&path, false).unwrap();
+        let told = line(&fields.read("y", |_| Ok(())).unwrap_err(), name);
+        assert!(told.contains("`y` claims shape ("), "{told}");
+        assert!(told.ends_with("expected at most 512 MiB"), "{told}");
+    }
+}
+
 #[test]
 fn what_is_no_array_of_numbers_is_named_only_when_it_is_asked_for() {
     for (name, bytes) in FILES.iter().filter(|(name, _)| *name != "level73.mat") {

@@ -229,6 +229,25 @@ fn a_checksum_is_compared_unless_it_is_zero() {
 }
 
 #[test]
+fn what_follows_the_end_is_damage() {
+    for chunk in [None, Some(300)] {
+        let whole = written(&packets(9, 40), chunk);
+        let length = whole.len() as u64;
+        assert_eq!(read(&whole).1, Damage::default());
+        for behind in [&[0][..], &[0x55; 3 << 20], &MAGIC[..7], &whole] {
+            let (entries, damage) = read(&[&whole, behind].concat());
+            assert_eq!(found(&entries).len(), 9);
+            let (bytes, first) = (behind.len() as u64, Some(length));
+            let another = (behind == whole).then_some(length);
+            assert_eq!(damage, Damage { places: 1, bytes, first, another, ..Damage::default() });
+        }
+        let told = read(&[whole.clone(), whole].concat()).1.to_string();
+        let place = format!("; another recording begins at byte {length}");
+        assert!(told.ends_with(&place), "{told}");
+    }
+}
+
+#[test]
 fn what_is_told_names_the_worst() {
     let none = Damage::default();
     for (damage, told) in [
@@ -240,6 +259,7 @@ fn what_is_told_names_the_worst() {
                 chunks: 1,
                 checksum: true,
                 is_cut: true,
+                another: None,
             },
             "30 bytes lost at 2 places, the first at byte 7; the file ends early",
         ),

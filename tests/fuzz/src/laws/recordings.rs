@@ -1,7 +1,7 @@
 //! Recordings, read and recovered.
 
 use crate::{Law, MIB, place, read, seeds};
-use nirspi::recording::{Recording, RecordingInfo, Target, recover};
+use nirspi::recording::{Recording, RecordingInfo, recover};
 use nirspi::source::{Source, SourceOptions};
 use nirspi::tally::tally_recording;
 use std::path::Path;
@@ -86,7 +86,7 @@ fn recovered(bytes: &[u8]) {
         let _ = std::fs::remove_file(old);
     }
     let before = packets(&path);
-    let Some(made) = read(recover(&path, &Target::New(once.clone()))) else {
+    let Some(made) = read(recover(&path, &once, false)) else {
         assert!(!once.exists(), "a file of nothing stays");
         return;
     };
@@ -101,7 +101,7 @@ fn recovered(bytes: &[u8]) {
     let account = end.account.expect("the new file has an account");
     assert_eq!(account.counters, made.frames);
     // Recovering a whole file changes nothing.
-    let again = recover(&once, &Target::New(twice.clone())).expect("a whole file");
+    let again = recover(&once, &twice, false).expect("a whole file");
     assert_eq!((again.packets, again.damage, again.frames), (made.packets, None, made.frames));
     let (last, end) = packets(&twice).expect("the second file opens");
     assert_eq!(last, after);
