@@ -44,6 +44,8 @@ def test_a_recording_that_was_cut_gives_what_is_before_the_cut(path, tmp_path):
     assert 0 < len(recording) < 30 and recording.cut_short and recording.account is None
     assert (recording.y == ns.Recording(path).y[: len(recording)]).all()
     assert any("cut short" in note for note in recording.measurement().notes)
+    with pytest.warns(RuntimeWarning, match="the recording is not whole: [0-9]+ received, 0 lost.*cut short"):
+        assert any("cut short" in note for note in ns.load(cut).notes)
 
 
 def test_the_measurement_of_a_recording_is_that_of_the_capture(path, tmp_path):

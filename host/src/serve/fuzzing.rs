@@ -88,6 +88,7 @@ impl Still {
             state: "{}".to_owned(),
             message: "{}".to_owned(),
             picture: Some(Arc::new(picture)),
+            ..Published::default()
         }));
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.expect("a runtime");
