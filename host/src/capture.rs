@@ -10,6 +10,7 @@
 //! (`missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). The frames that a camera
 //! delivers limit what this program writes (`junk::tests`).
 
+mod frames_due;
 mod junk;
 mod missing;
 #[cfg(feature = "pictures")]
@@ -104,6 +105,11 @@ pub enum Ended {
         /// Number of these bytes.
         bytes: u64,
     },
+    /// The camera said that it measured, and sent no frame. The run was stopped.
+    NoFrames {
+        /// How long it sent none.
+        waited: Duration,
+    },
     /// The camera disconnected or fell silent. How many frames it made after the last received
     /// frame is unknown.
     LinkLost(SessionError),
@@ -120,6 +126,7 @@ impl Ended {
             Self::WrongNumber { .. } => "the camera made another number of frames",
             Self::Unconfirmed(_) => "the camera did not say whether a fault is latched",
             Self::Junk { .. } => "most of the bytes were damaged or of other runs",
+            Self::NoFrames { .. } => "the camera sent no frames",
             Self::LinkLost(_) => "the link to the camera was lost",
         }
     }

@@ -5,9 +5,10 @@ use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
 use super::provenance::made;
 use super::{Usage, address, print, stop_on_signal};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use nirspi::calibration::Choice;
 use nirspi::exposure::Light;
+use nirspi::files::read_small_text;
 use nirspi::link::CameraAddress;
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
 use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Server, StagedScene, Token, serve};
@@ -43,6 +44,10 @@ pub struct Args {
     /// reaches, else a random one, in the printed address]
     #[arg(long, value_name = "TOKEN")]
     token: Option<Token>,
+    /// File whose only line is the token. Other users of this machine can read a token on the command line, but not this file
+    /// if its mode forbids that
+    #[arg(long, value_name = "FILE", conflicts_with = "token")]
+    token_file: Option<PathBuf>,
     /// Folder for recordings, which the page begins and ends. Without it, the page cannot record
     #[arg(long, value_name = "DIR")]
     record_to: Option<PathBuf>,
@@ -74,6 +79,16 @@ pub struct Args {
     scene: SceneArgs,
 }
 
+impl Args {
+    /// The token that the user has chosen.
+    fn token(&self) -> Result<Option<Token>> {
+        let Some(file) = &self.token_file else { return Ok(self.token.clone()) };
+        let named = || format!("--token-file {}", file.display());
+        let text = read_small_text(file).with_context(named)?;
+        Ok(Some(text.trim().parse::<Token>().map_err(|why| anyhow!("{}: {why}", named()))?))
+    }
+}
+
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
@@ -93,7 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(folder) = args.record_to.as_ref().filter(|folder| !folder.is_dir()) {
         bail!("--record-to {}: found no such folder", folder.display());
     }
-    let server = Server::bind(&args.listen, args.token.clone(), made())
+    let server = Server::bind(&args.listen, args.token()?, made())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let imaging =
         Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(args)?)?;

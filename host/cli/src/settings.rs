@@ -32,8 +32,8 @@ pub struct GeneralArgs {
     /// NIRSPI_FRAMES beats the file, and the command line beats both
     #[arg(long, visible_alias = "setup", value_name = "FILE", global = true)]
     settings: Option<PathBuf>,
-    /// When the command has succeeded, save its options in this file, as the table of the command. --out, --overwrite and
-    /// --json are left out
+    /// When the command has succeeded, save its options in this file, as the table of the command. --out, --overwrite,
+    /// --json and --token are left out
     #[arg(long, visible_alias = "save-setup", value_name = "FILE", global = true)]
     save_settings: Option<PathBuf>,
 }
@@ -41,6 +41,8 @@ pub struct GeneralArgs {
 /// Options that say what to do with settings, and options that belong to one run.
 const NEVER_SAVED: [&str; 8] =
     ["settings", "save-settings", "quiet", "verbose", "json", "out", "overwrite", "help"];
+/// Options whose value is neither saved nor shown.
+const SECRET: [&str; 1] = ["token"];
 /// Options that cannot have a default.
 const NO_DEFAULT: [&str; 4] = ["settings", "save-settings", "help", "version"];
 
@@ -87,7 +89,8 @@ impl Settings {
         print::say(asked.quiet, asked.verbose);
         let given = self.defaults.iter().filter_map(|(name, given)| Some((name, given.as_ref()?)));
         for (name, given) in given {
-            let values = given.values.join(", ");
+            let is_secret = SECRET.contains(&name.as_str());
+            let values = if is_secret { "(secret)".into() } else { given.values.join(", ") };
             print::detail(format_args!("--{name} {values}: from {}", given.origin));
         }
     }
@@ -188,7 +191,7 @@ impl<'c> Line<'c> {
         let mut used = Vec::new();
         for arg in self.leaf.get_arguments() {
             let (id, Some(name)) = (arg.get_id().as_str(), arg.get_long()) else { continue };
-            if NEVER_SAVED.contains(&name) {
+            if NEVER_SAVED.contains(&name) || SECRET.contains(&name) {
                 continue;
             }
             let given = matches.value_source(id) == Some(ValueSource::CommandLine);

@@ -50,6 +50,16 @@ impl Capture {
                      capture was ended"
                 ))
             }
+            Ended::NoFrames { waited } => {
+                let (frames, seconds) = (self.counters.total(), waited.as_secs());
+                let after = match frames {
+                    0 => String::new(),
+                    frames => format!(" after {}", count(frames, "frame")),
+                };
+                Some(format!(
+                    "the camera said that it was measuring and sent nothing{after} for {seconds} s, and the capture was ended"
+                ))
+            }
             Ended::LinkLost(error) => {
                 let error = causes::in_one_line(error);
                 Some(format!("{error}; what the camera made after the last frame is not known"))
@@ -132,7 +142,7 @@ mod tests {
         assert_eq!(whole().missing(), None);
         let no_answer = || SessionError::NoAnswer { command: "Status" };
         let short = || LossCounters { received: 3, ..Default::default() };
-        let cases: [(Capture, &[&str]); 8] = [
+        let cases: [(Capture, &[&str]); 9] = [
             (
                 Capture {
                     counters: short(),
@@ -165,6 +175,10 @@ mod tests {
             (Capture { ended: Ended::Stopped, made: Some(7), ..whole() }, &["after 7 of 50"]),
             (Capture { ended: Ended::Junk { bytes: 67_000_000 }, ..whole() }, &["67 MB"]),
             (Capture { ended: Ended::LinkLost(no_answer()), ..whole() }, &["not known"]),
+            (
+                Capture { ended: Ended::NoFrames { waited: Duration::from_secs(6) }, ..whole() },
+                &["sent nothing after 50 frames for 6 s"],
+            ),
         ];
         for (capture, words) in cases {
             let missing = capture.missing().unwrap();

@@ -1,5 +1,6 @@
 //! One run of a capture in turns, so that a caller can do other work in between.
 
+use super::frames_due::FramesDue;
 use super::junk::Junk;
 use super::{Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress};
 use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
@@ -68,6 +69,9 @@ pub struct Run {
     /// The camera knows of no session, so it has restarted.
     forgotten: bool,
     junk: Junk,
+    due: FramesDue,
+    /// How long the camera has sent no frame, if that is too long.
+    overdue: Option<Duration>,
     started: Instant,
     /// Time of the last intact packet.
     last_intact: Instant,
@@ -111,6 +115,7 @@ impl Listener for Packets<'_> {
         run.junk.packet(raw.len(), content, run.tally.arrived() > before, now);
         match content {
             Ok(DeviceMessage::Frame(frame)) if received => {
+                run.due.frame(now, frame.device_time_us);
                 observer.frame(frame, &run.tally.account().counters());
             }
             Ok(message) => observer.message(message),
@@ -122,6 +127,7 @@ impl Listener for Packets<'_> {
             }
             Ok(DeviceMessage::Reply(Reply { outcome: Ok(Answer::Status(status)), .. })) => {
                 run.status = Some(*status);
+                run.due.status(status.uptime_us);
             }
             Ok(DeviceMessage::Reply(Reply { outcome: Err(Refusal::Protocol { .. }), .. })) => {
                 run.forgotten = true;
@@ -180,6 +186,7 @@ impl Run {
         observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
         let now = Instant::now();
         let tally = Tally::new(&setup, Some(number));
+        let due = FramesDue::new(setup.frame_ns(), now);
         let mut run = Self {
             setup,
             settling,
@@ -193,6 +200,8 @@ impl Run {
             status: None,
             forgotten: false,
             junk: Junk::new(now),
+            due,
+            overdue: None,
             started: now,
             last_intact: now,
             turned: now,
@@ -226,7 +235,10 @@ impl Run {
     }
 
     fn goes_on(&self) -> bool {
-        !self.tally.has_ended() && !self.junk.is_too_much() && !self.has_more_than_asked()
+        !self.tally.has_ended()
+            && !self.junk.is_too_much()
+            && !self.has_more_than_asked()
+            && self.overdue.is_none()
     }
 
     /// Whether the camera has sent more frames than requested.
@@ -272,10 +284,16 @@ impl Run {
         if self.stopped.is_some_and(|stopped| stopped.elapsed() > STOP_TIMEOUT) {
             return Err(SessionError::NoAnswer { command: request::Stop::NAME });
         }
-        if self.turned.elapsed() > STOOD_STILL {
-            self.last_intact = Instant::now();
+        let now = Instant::now();
+        if now.saturating_duration_since(self.turned) > STOOD_STILL {
+            self.last_intact = now;
+            self.due.stood_still(now);
         }
-        self.turned = Instant::now();
+        self.turned = now;
+        // A replay has the pauses of its recording.
+        if self.stopped.is_none() && session.recorded().is_none() {
+            self.overdue = self.due.overdue(now);
+        }
         if self.last_intact.elapsed() > ANSWER_TIMEOUT {
             return Err(SessionError::NoAnswer { command: request::Status::NAME });
         }
@@ -357,6 +375,10 @@ impl Run {
             // The camera may not receive the stop.
             let _ = self.stop_at_once(session, observer);
             return Ok(Ended::Junk { bytes: self.junk.bytes() });
+        }
+        if let Some(waited) = self.overdue {
+            self.stop_at_once(session, observer)?;
+            return Ok(Ended::NoFrames { waited });
         }
         let asked = self.asked;
         if !self.tally.has_ended() {

@@ -434,7 +434,7 @@ impl Live {
             (None, Ended::LinkLost(error) | Ended::Unconfirmed(error)) => {
                 Some(End::Gone(causes::in_one_line(&error)))
             }
-            (None, Ended::WrongNumber { .. } | Ended::Junk { .. }) => {
+            (None, Ended::WrongNumber { .. } | Ended::Junk { .. } | Ended::NoFrames { .. }) => {
                 Some(End::Gone(missing.unwrap_or_default()))
             }
             (None, Ended::Complete | Ended::Stopped) => None,

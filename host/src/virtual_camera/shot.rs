@@ -177,7 +177,7 @@ pub fn shoot(
         Ended::Stopped => Err(ShotError::Stopped { received: capture.counters.received }),
         Ended::Fault(fault) => Err(ShotError::Fault(fault)),
         Ended::LinkLost(error) | Ended::Unconfirmed(error) => Err(error.into()),
-        Ended::WrongNumber { .. } | Ended::Junk { .. } => {
+        Ended::WrongNumber { .. } | Ended::Junk { .. } | Ended::NoFrames { .. } => {
             Err(ShotError::NotWhole(missing.unwrap_or_default()))
         }
     }

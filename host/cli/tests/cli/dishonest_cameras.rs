@@ -10,6 +10,7 @@ use nirspi_wire::{
 };
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::time::Instant;
 
 /// What a camera does between `Start` and the end of its run.
 #[derive(Debug, Clone, Copy)]
@@ -45,13 +46,17 @@ const HONEST: Run = Run {
 
 /// A camera of one host that does this in each run. `configured` is called with each `Configure`.
 fn camera(run: Run, configured: impl Fn() + Send + 'static) -> String {
-    serve(move |host| Camera { host, run, started: false, refuses: None }.serve(&configured))
+    serve(move |host| {
+        Camera { host, run, started: false, refuses: None, powered_up: Instant::now() }
+            .serve(&configured);
+    })
 }
 
 /// A camera that refuses to start.
 fn refusing(refusal: Refusal) -> String {
     serve(move |host| {
-        Camera { host, run: HONEST, started: false, refuses: Some(refusal) }.serve(&|| {});
+        let (refuses, powered_up) = (Some(refusal), Instant::now());
+        Camera { host, run: HONEST, started: false, refuses, powered_up }.serve(&|| {});
     })
 }
 
@@ -67,6 +72,7 @@ struct Camera {
     run: Run,
     started: bool,
     refuses: Option<Refusal>,
+    powered_up: Instant,
 }
 
 /// The number of the run before this one.
@@ -120,7 +126,7 @@ impl Camera {
                 None => State::Configured,
             },
             fault,
-            uptime_us: 1,
+            uptime_us: self.powered_up.elapsed().as_micros() as u64,
             run: EARLIER_RUN + u16::from(self.started),
             frames_made: self.run.says.unwrap_or(self.run.frames),
             frames_sent: self.run.frames,
@@ -287,6 +293,13 @@ fn nothing_but_damaged_packets_neither_succeeds_nor_fills_the_disk() {
 fn nothing_but_frames_of_another_run_neither_succeeds_nor_fills_the_disk() {
     let run = Run { frames: 2, says: None, flood: Some(Flood::OfAnotherRun), ..HONEST };
     incomplete(run, 2, &["67 MB of damaged packets and packets of other runs came with 2 frames"]);
+}
+
+#[test]
+fn a_camera_that_says_that_it_measures_and_sends_nothing_ends_the_capture() {
+    let run = Run { frames: 3, says: None, stuck: true, ..HONEST };
+    let report = incomplete(run, 3, &["measuring and sent nothing after 3 frames for 5 s"]);
+    assert_eq!(report["made"], serde_json::Value::Null, "{report}");
 }
 
 #[test]

@@ -52,6 +52,29 @@ fn a_client_in_the_network_gets_nothing_without_the_token() {
 }
 
 #[test]
+fn a_token_is_read_from_a_file_and_is_neither_saved_nor_shown() {
+    let bench = Bench::new();
+    bench.write("token.txt", format!("{TOKEN}\r\n").as_bytes());
+    let server = serve(&bench, &["--token-file", "token.txt"]);
+    assert_eq!(server.query, format!("token={TOKEN}"));
+    bench.write("token.txt", b"short");
+    let told = ["--token-file token.txt", "a token of 5 characters, expected 16 to 128"];
+    bench.run(&["serve", "--token-file", "token.txt"]).failed(1, &told);
+
+    bench.write("lab.toml", format!("[serve]\ntoken = \"{TOKEN}\"\n").as_bytes());
+    let more = ["--settings", "lab.toml", "--save-settings", "new.toml", "--verbose"];
+    let server = serve(&bench, &more);
+    assert_eq!(server.query, format!("token={TOKEN}"));
+    server.process.signal("INT");
+    let outcome = server.process.wait();
+    let saved = std::fs::read_to_string(bench.path("new.toml")).unwrap();
+    assert!(saved.contains("[serve]") && !saved.contains(TOKEN), "{saved}");
+    let told = outcome.stderr.lines().filter(|line| line.contains("token"));
+    let told: Vec<&str> = told.collect();
+    assert_eq!(told, ["nirspi: --token (secret): from lab.toml, [serve]"], "{outcome:?}");
+}
+
+#[test]
 fn a_token_of_the_user_counts_on_this_machine_too_and_comes_from_the_environment() {
     let bench = Bench::new();
     let server = serve(&bench, &["--token", TOKEN]);
