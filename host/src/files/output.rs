@@ -359,7 +359,17 @@ fn place(staged: Staged, target: &Path, replaces: bool) -> Result<(), FileError>
         // A file system that has no modes refuses.
         let _ = fs::set_permissions(&path, old.permissions());
     }
-    let placed = if replaces { path.persist(behind) } else { path.persist_noclobber(behind) };
+    let placed = match replaces {
+        true => path.persist(behind),
+        false => path.persist_noclobber(&behind).or_else(|refused| {
+            // Some file systems have no such call, nor hard links.
+            let taken = refused.error.kind() == io::ErrorKind::AlreadyExists;
+            match taken || fs::symlink_metadata(&behind).is_ok() {
+                true => Err(refused),
+                false => refused.path.persist(behind),
+            }
+        }),
+    };
     placed.map_err(|error| match error.error.kind() {
         io::ErrorKind::AlreadyExists => {
             let expected = "a name that is free: another program has taken it meanwhile";
