@@ -26,6 +26,7 @@ pub use run::Run;
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling};
 use crate::clock::Instant;
+use crate::files::interrupt::Signal;
 use crate::integrate::Integrated;
 use crate::recording::Target;
 use crate::session::{CameraIdentity, Session, SessionError};
@@ -82,13 +83,35 @@ pub struct Progress {
     pub queued: f64,
 }
 
+/// Why a capture is stopped before its camera ends it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopCause {
+    /// The user wishes so.
+    User,
+    /// The time that was asked for is over.
+    TimeOver,
+    /// A signal that is not the user's wish: the terminal has gone, or the system ends the program.
+    Signal(Signal),
+}
+
+impl StopCause {
+    /// Why this program was asked to stop by a person or the system.
+    #[must_use]
+    pub fn of_program() -> Self {
+        match crate::files::interrupt::first() {
+            Some(signal) if !signal.is_wish() => Self::Signal(signal),
+            _ => Self::User,
+        }
+    }
+}
+
 /// What ended a capture.
 #[derive(Debug)]
 pub enum Ended {
     /// The camera reports that all requested frames were made, and that no fault is latched.
     Complete,
-    /// The user stopped the capture.
-    Stopped,
+    /// The capture was stopped.
+    Stopped(StopCause),
     /// The camera switched its LEDs off.
     Fault(Fault),
     /// The camera ended the run by itself with another number of frames than requested.
@@ -121,7 +144,9 @@ impl Ended {
     pub fn in_words(&self) -> &'static str {
         match self {
             Self::Complete => "all frames made",
-            Self::Stopped => "stopped by the user",
+            Self::Stopped(StopCause::User) => "stopped by the user",
+            Self::Stopped(StopCause::TimeOver) => "all seconds over",
+            Self::Stopped(StopCause::Signal(_)) => "ended by a signal",
             Self::Fault(_) => "the camera switched its LEDs off",
             Self::WrongNumber { .. } => "the camera made another number of frames",
             Self::Unconfirmed(_) => "the camera did not say whether a fault is latched",
@@ -181,8 +206,8 @@ pub enum CaptureError {
          a latency that you know with --no-calibration --adc-latency N)"
     )]
     Calibration(#[source] CalibrationError),
-    /// The user stopped the capture before the run began.
-    #[error("stopped by the user before the first frame")]
+    /// The capture was stopped before the run began.
+    #[error("stopped before the first frame")]
     Stopped,
     /// The recording cannot be started.
     #[error("{path}: cannot record")]
@@ -243,15 +268,15 @@ pub trait Observer {
     fn message(&mut self, _message: &DeviceMessage<'_>) {}
 
     /// Reports the progress, which is 0 during calibration. Called at least ten times a second; a
-    /// break stops the capture.
-    fn watch(&mut self, progress: &Progress) -> ControlFlow<()>;
+    /// break stops the capture, for this cause.
+    fn watch(&mut self, progress: &Progress) -> ControlFlow<StopCause>;
 }
 
 /// An observer that only watches the progress.
-struct Watching<'w>(&'w mut dyn FnMut(&Progress) -> ControlFlow<()>);
+struct Watching<'w>(&'w mut dyn FnMut(&Progress) -> ControlFlow<StopCause>);
 
 impl Observer for Watching<'_> {
-    fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
+    fn watch(&mut self, progress: &Progress) -> ControlFlow<StopCause> {
         (self.0)(progress)
     }
 }
@@ -264,7 +289,7 @@ impl Observer for Watching<'_> {
 pub fn capture(
     session: &mut Session,
     options: &CaptureOptions,
-    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<StopCause>,
 ) -> Result<Capture, CaptureError> {
     observe(session, options, &mut Watching(watch))
 }

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
 use nirspi::link::CameraAddress;
 use nirspi::recording::{Recorder, Recording, RunAccount, Target};
 use nirspi::session::{CameraIdentity, Session};
@@ -191,9 +191,9 @@ fn a_replay_that_is_stopped_loses_no_frame() {
     let captured =
         capture(&mut session, &options, &mut |progress| match progress.counters.received {
             0..2 => ControlFlow::Continue(()),
-            _ => ControlFlow::Break(()),
+            _ => ControlFlow::Break(StopCause::User),
         })
         .unwrap();
-    assert!(matches!(captured.ended, Ended::Stopped), "{:?}", captured.ended);
+    assert!(matches!(captured.ended, Ended::Stopped(StopCause::User)), "{:?}", captured.ended);
     assert_eq!(captured.counters.lost, 0, "{}", captured.counters);
 }

@@ -3,7 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
 use nirspi::link::{Link, Received};
 use nirspi::recording::{Recording, Target};
 use nirspi::session::{Session, SessionError};
@@ -402,13 +402,13 @@ fn stopping_keeps_what_has_come() {
     let options = CaptureOptions { frames: None, ..options(&Order::Natural, false) };
     let captured = capture(&mut session, &options, &mut |progress| {
         if progress.counters.received >= 3 {
-            ControlFlow::Break(())
+            ControlFlow::Break(StopCause::User)
         } else {
             ControlFlow::Continue(())
         }
     })
     .unwrap();
-    assert!(matches!(captured.ended, Ended::Stopped));
+    assert!(matches!(captured.ended, Ended::Stopped(StopCause::User)));
     assert!(captured.counters.received >= 3 && captured.counters.is_complete());
 }
 
@@ -425,11 +425,11 @@ fn a_host_that_was_suspended_does_not_blame_its_camera() {
             before = Some(progress.counters.received);
             ControlFlow::Continue(())
         }
-        Some(before) if progress.counters.received > before => ControlFlow::Break(()),
+        Some(before) if progress.counters.received > before => ControlFlow::Break(StopCause::User),
         Some(_) => ControlFlow::Continue(()),
     })
     .unwrap();
-    assert!(matches!(captured.ended, Ended::Stopped), "{:?}", captured.ended);
+    assert!(matches!(captured.ended, Ended::Stopped(StopCause::User)), "{:?}", captured.ended);
     assert!(captured.counters.is_complete());
 }
 

@@ -3,11 +3,13 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
 use super::report::ReportArgs;
-use super::{Usage, address, print, progress, provenance, stop_on_signal};
+use super::{Usage, address, print, progress, provenance};
 use anyhow::Result;
 use nirspi::calibration::Origin;
-use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, observe};
+use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, StopCause, observe};
 use nirspi::exposure::Light;
+use nirspi::files::interrupt;
+use nirspi::files::output::refuse_dash;
 use nirspi::link::CameraAddress;
 use nirspi::picture::half_blocks;
 use nirspi::recording::Target;
@@ -17,12 +19,14 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// Record frames of a camera into an MCAP file
 ///
 /// The command uses the ADC latency and settling that `nirspi calibrate` or `nirspi selftest` has kept for this camera. If
 /// none are kept, the command measures them on the scene first; if the scene is too dim, the command ends with an error.
-/// Ctrl-C ends the recording and keeps it. On a terminal with colours a small image of the newest frames is shown (not
+/// Ctrl-C ends the recording and keeps it. A recording that ends because the terminal has gone or the system ends the program
+/// is kept too, says so, and the exit code is 1; `nohup nirspi capture` goes on without its terminal. On a terminal with colours a small image of the newest frames is shown (not
 /// with --quiet, and not if NO_COLOR is set). The exit code is 0 only if nothing is missing: every frame arrived intact, and
 /// the camera reports no fault. Otherwise one line says what is missing, the recording is kept, and the exit code is 1.
 #[derive(Debug, clap::Args)]
@@ -39,6 +43,10 @@ pub struct Args {
     frames: Option<u32>,
     #[arg(long, value_name = "TIME", conflicts_with = "frames", allow_hyphen_values = true, help = LIGHT_HELP)]
     light: Option<Light>,
+    /// Seconds to measure, after which the recording ends as if it had all its frames
+    #[arg(long, value_name = "S", conflicts_with_all = ["frames", "light"], allow_hyphen_values = true,
+          value_parser = seconds)]
+    seconds: Option<Duration>,
     #[command(flatten)]
     setup: SetupArgs,
     #[command(flatten)]
@@ -71,7 +79,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         (frames, setup.sweeps) = (Some(exposure.frames), exposure.sweeps);
     }
     let target = target(args)?;
-    let stop = stop_on_signal()?;
+    let seconds = args.seconds;
+    let stop = interrupt::stop_flag();
     let mut session = address::open(&args.camera.camera, &args.scene)?;
     let choice = args.calibration.choose(&setup, session.identity())?;
     let options = CaptureOptions {
@@ -88,8 +97,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         bar.set(progress.counters.total());
         bar.say(format!("{}{seen}", progress.counters));
+        // The time of calibration does not count.
+        let over =
+            seconds.is_some_and(|most| progress.waited.is_some() && progress.elapsed >= most);
         match stop.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
+            true => ControlFlow::Break(StopCause::of_program()),
+            false if over => ControlFlow::Break(StopCause::TimeOver),
             false => ControlFlow::Continue(()),
         }
     };
@@ -113,8 +126,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(code)
 }
 
+/// A time in seconds.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse::<f64>().ok().filter(|seconds| (1e-3..=1e8).contains(seconds));
+    seconds
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| "expected seconds above 0, like 60".to_owned())
+}
+
 /// Where to record. A name that is taken is refused before the camera is asked for anything.
 fn target(args: &Args) -> Result<Target> {
+    args.out.as_deref().map_or(Ok(()), refuse_dash)?;
     Ok(match &args.out {
         Some(path) if args.overwrite => Target::Replace(path.clone()),
         Some(path) if path.exists() => {

@@ -39,19 +39,18 @@ mod serve;
 mod serve_virtual;
 mod settings;
 mod setup;
+mod signals;
 mod source;
 mod train;
 mod update;
 mod upscale;
 
-use anyhow::Context;
 use clap::{CommandFactory, Parser, Subcommand};
 use nirspi::about::About;
-use nirspi::files::{FileError, interrupt};
+use nirspi::files::FileError;
 use nirspi_eval::EvalError;
 use std::process::ExitCode;
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, LazyLock};
+use std::sync::LazyLock;
 
 static VERSION: LazyLock<String> =
     LazyLock::new(|| About::this_build(option_env!("NIRSPI_COMMIT")).to_string());
@@ -130,12 +129,6 @@ fn refused(error: EvalError) -> anyhow::Error {
     }
 }
 
-/// A flag that is set by the first signal. The second signal ends the program at once.
-fn stop_on_signal() -> anyhow::Result<Arc<AtomicBool>> {
-    interrupt::catch(ctrlc::set_handler).context("signals cannot be caught")?;
-    Ok(interrupt::stop_flag())
-}
-
 fn main() -> ExitCode {
     let (cli, settings) = match settings::parse::<Cli>(
         headings::arranged(Cli::command()),
@@ -155,9 +148,9 @@ fn main() -> ExitCode {
     // The date of everything that this run writes.
     provenance::made();
     settings.begin(&cli.general);
-    if !interrupt::ignores_hangup() {
-        // Without a handler, signals end the program as usual.
-        let _ = interrupt::catch(ctrlc::set_handler);
+    if let Err(error) = signals::catch() {
+        // Signals then end the program at once, and a capture with it.
+        print::remark(format_args!("signals cannot be caught: {error}"));
     }
     let done = run(cli.command).and_then(|code| settings.save(&cli.general).map(|()| code));
     done.unwrap_or_else(|error| {

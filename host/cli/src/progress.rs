@@ -94,7 +94,7 @@ impl Progress {
     }
 
     /// Watches one capture or several in turn, and goes on with them.
-    pub fn watch(&self) -> impl FnMut(&capture::Progress) -> ControlFlow<()> + '_ {
+    pub fn watch(&self) -> impl FnMut(&capture::Progress) -> ControlFlow<capture::StopCause> + '_ {
         let (mut before, mut last) = (0, 0);
         move |progress| {
             let now = progress.counters.total();

@@ -4,11 +4,11 @@ use super::calibration::CalibrationArgs;
 use super::camera::{CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
 use super::provenance::made;
-use super::{Usage, address, print, stop_on_signal};
+use super::{Usage, address, print};
 use anyhow::{Context, Result, anyhow, bail};
 use nirspi::calibration::Choice;
 use nirspi::exposure::Light;
-use nirspi::files::read_small_text;
+use nirspi::files::{interrupt, read_small_text};
 use nirspi::link::CameraAddress;
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
 use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Server, StagedScene, Token, serve};
@@ -121,7 +121,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let refused = |why| Usage(format!("--warm-start: {why}"));
         imaging.check_warm_start(settings.method).map_err(refused)?;
     }
-    let stop = stop_on_signal()?;
+    let stop = interrupt::stop_flag();
     let session = address::open(&args.camera.camera, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
     print::line(server.invitation(&args.camera.camera))?;

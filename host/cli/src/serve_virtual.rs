@@ -1,8 +1,9 @@
 //! `nirspi virtual`: the virtual camera behind a TCP port.
 
 use super::camera::SceneArgs;
-use super::{print, stop_on_signal};
+use super::print;
 use anyhow::{Context, Result};
+use nirspi::files::interrupt;
 use nirspi::virtual_camera::{
     PrecomputedFpga, ServeOptions, SimulatedFpga, VirtualCamera, serve, serve_tunnel,
 };
@@ -55,7 +56,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let listener = TcpListener::bind(&args.listen)
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
-    let stop = stop_on_signal()?;
+    let stop = interrupt::stop_flag();
     let address = listener.local_addr()?;
     print::line(format_args!("virtual camera on tcp:{address}: {scene}"))?;
     let options = ServeOptions {

@@ -63,7 +63,7 @@ pub enum CalibrationError {
     #[error(transparent)]
     Session(#[from] SessionError),
     /// The user stopped the calibration.
-    #[error("stopped by the user while the camera was being calibrated")]
+    #[error("stopped while the camera was being calibrated")]
     Stopped,
     /// Samples of the burst are missing.
     #[error("only {found} of {expected} samples of the calibration burst came")]

@@ -1,6 +1,6 @@
 //! Says in words what a capture lacks.
 
-use super::{Capture, Ended};
+use super::{Capture, Ended, StopCause};
 use crate::account::LossCounters;
 use crate::causes;
 use nirspi_recon::words::count;
@@ -9,7 +9,7 @@ impl Capture {
     /// What is missing, in one line; `None` if the capture is whole. A capture is whole if all
     /// requested frames were made and arrived, no other packet was damaged, and the camera reports
     /// that no fault is latched. A run without a number of frames is whole when the user has
-    /// stopped it and all frames made have arrived.
+    /// stopped it, or its time is over, and all frames made have arrived.
     #[must_use]
     pub fn missing(&self) -> Option<String> {
         let parts: Vec<String> = [self.end(), frames(self.counters)]
@@ -24,7 +24,10 @@ impl Capture {
     fn end(&self) -> Option<String> {
         match &self.ended {
             Ended::Complete => None,
-            Ended::Stopped => self.asked.map(|asked| {
+            Ended::Stopped(StopCause::Signal(signal)) => {
+                Some(format!("ended by {signal}{}", self.of_asked()))
+            }
+            Ended::Stopped(StopCause::User | StopCause::TimeOver) => self.asked.map(|asked| {
                 let made = self.made.unwrap_or_default();
                 format!("stopped by the user after {made} of {asked} frames")
             }),
@@ -94,6 +97,7 @@ fn frames(counters: LossCounters) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::interrupt::Signal;
     use crate::integrate::Integrated;
     use crate::session::{CameraIdentity, SessionError};
     use crate::setup::MeasurementSetup;
@@ -142,7 +146,7 @@ mod tests {
         assert_eq!(whole().missing(), None);
         let no_answer = || SessionError::NoAnswer { command: "Status" };
         let short = || LossCounters { received: 3, ..Default::default() };
-        let cases: [(Capture, &[&str]); 9] = [
+        let cases: [(Capture, &[&str]); 10] = [
             (
                 Capture {
                     counters: short(),
@@ -172,7 +176,18 @@ mod tests {
             ),
             (Capture { damaged_packets: 2, ..whole() }, &["2 damaged packets"]),
             (Capture { ended: Ended::Unconfirmed(no_answer()), ..whole() }, &["whether a fault"]),
-            (Capture { ended: Ended::Stopped, made: Some(7), ..whole() }, &["after 7 of 50"]),
+            (
+                Capture { ended: Ended::Stopped(StopCause::User), made: Some(7), ..whole() },
+                &["stopped by the user after 7 of 50"],
+            ),
+            (
+                Capture {
+                    ended: Ended::Stopped(StopCause::Signal(Signal::Hangup)),
+                    asked: None,
+                    ..whole()
+                },
+                &["ended by the end of the terminal (SIGHUP) after 50 frames"],
+            ),
             (Capture { ended: Ended::Junk { bytes: 67_000_000 }, ..whole() }, &["67 MB"]),
             (Capture { ended: Ended::LinkLost(no_answer()), ..whole() }, &["not known"]),
             (
@@ -188,8 +203,10 @@ mod tests {
 
     #[test]
     fn a_run_without_a_length_is_whole_when_the_user_stops_it() {
-        let stopped = Capture { asked: None, ended: Ended::Stopped, ..whole() };
-        assert_eq!(stopped.missing(), None);
+        for cause in [StopCause::User, StopCause::TimeOver] {
+            let stopped = Capture { asked: None, ended: Ended::Stopped(cause), ..whole() };
+            assert_eq!(stopped.missing(), None);
+        }
         let ended = Ended::WrongNumber { made: 50, asked: None };
         let by_itself = Capture { asked: None, ended, ..whole() };
         assert!(by_itself.missing().unwrap().contains("by itself after 50 frames"));

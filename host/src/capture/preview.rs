@@ -1,6 +1,6 @@
 //! A small image of the newest frames while a capture runs.
 
-use super::{Observer, Progress};
+use super::{Observer, Progress, StopCause};
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, Settling};
 use crate::clock::Instant;
@@ -33,7 +33,7 @@ struct Run {
     newest: Integrated,
 }
 
-impl<W: FnMut(&Progress, Option<Image>) -> ControlFlow<()>> Preview<W> {
+impl<W: FnMut(&Progress, Option<Image>) -> ControlFlow<StopCause>> Preview<W> {
     /// A preview for this function.
     pub fn new(watch: W) -> Self {
         Self { watch, run: None, made: Instant::now() }
@@ -53,7 +53,7 @@ impl Run {
     }
 }
 
-impl<W: FnMut(&Progress, Option<Image>) -> ControlFlow<()>> Observer for Preview<W> {
+impl<W: FnMut(&Progress, Option<Image>) -> ControlFlow<StopCause>> Observer for Preview<W> {
     fn begins(
         &mut self,
         setup: &MeasurementSetup,
@@ -75,7 +75,7 @@ impl<W: FnMut(&Progress, Option<Image>) -> ControlFlow<()>> Observer for Preview
         }
     }
 
-    fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
+    fn watch(&mut self, progress: &Progress) -> ControlFlow<StopCause> {
         let mut image = None;
         if self.made.elapsed() >= PERIOD {
             self.made = Instant::now();

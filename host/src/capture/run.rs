@@ -2,7 +2,9 @@
 
 use super::frames_due::FramesDue;
 use super::junk::Junk;
-use super::{Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress};
+use super::{
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
+};
 use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
 use crate::clock::Instant;
 use crate::recording::{Recorder, Recording, RunAccount};
@@ -17,6 +19,7 @@ use nirspi_wire::{
     Status,
 };
 use std::io;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -77,8 +80,8 @@ pub struct Run {
     last_intact: Instant,
     /// When the last turn ended.
     turned: Instant,
-    /// When the observer asked for the end of the run; `None` before.
-    stopped: Option<Instant>,
+    /// When the run was stopped, and why; `None` before.
+    stopped: Option<(Instant, StopCause)>,
     kept_alive: Instant,
     kept_alive_us: u64,
     watched: Instant,
@@ -230,7 +233,7 @@ impl Run {
     /// Asks the camera to stop, as if the observer had broken. The last frames come in later turns.
     pub fn stop(&mut self, session: &mut Session, observer: &mut dyn Observer) {
         if self.broken.is_none() && self.stopped.is_none() && self.goes_on() {
-            self.broken = self.stop_at_once(session, observer).err();
+            self.broken = self.stop_at_once(session, observer, StopCause::User).err();
         }
     }
 
@@ -276,12 +279,19 @@ impl Run {
                 damaged_packets: self.tally.account().damaged_packets(),
                 queued: self.recorder.as_ref().map_or(0.0, Recorder::queued),
             };
-            let wants_stop = observer.watch(&progress).is_break() || self.recorder_error.is_some();
-            if wants_stop && self.stopped.is_none() && !self.tally.has_ended() {
-                self.stop_at_once(session, observer)?;
+            let cause = match observer.watch(&progress) {
+                ControlFlow::Break(cause) => Some(cause),
+                // The error of the recording is what ends the capture.
+                ControlFlow::Continue(()) => self.recorder_error.as_ref().map(|_| StopCause::User),
+            };
+            if let Some(cause) = cause
+                && self.stopped.is_none()
+                && !self.tally.has_ended()
+            {
+                self.stop_at_once(session, observer, cause)?;
             }
         }
-        if self.stopped.is_some_and(|stopped| stopped.elapsed() > STOP_TIMEOUT) {
+        if self.stopped.is_some_and(|(stopped, _)| stopped.elapsed() > STOP_TIMEOUT) {
             return Err(SessionError::NoAnswer { command: request::Stop::NAME });
         }
         let now = Instant::now();
@@ -373,16 +383,16 @@ impl Run {
     ) -> Result<Ended, SessionError> {
         if self.junk.is_too_much() {
             // The camera may not receive the stop.
-            let _ = self.stop_at_once(session, observer);
+            let _ = self.stop_at_once(session, observer, StopCause::User);
             return Ok(Ended::Junk { bytes: self.junk.bytes() });
         }
         if let Some(waited) = self.overdue {
-            self.stop_at_once(session, observer)?;
+            self.stop_at_once(session, observer, StopCause::User)?;
             return Ok(Ended::NoFrames { waited });
         }
         let asked = self.asked;
         if !self.tally.has_ended() {
-            self.stop_at_once(session, observer)?;
+            self.stop_at_once(session, observer, StopCause::User)?;
             return Ok(Ended::WrongNumber { made: self.tally.account().accounted(), asked });
         }
         // The status also shows a fault whose event was in a damaged packet.
@@ -402,8 +412,10 @@ impl Run {
             (Some(fault), _) | (None, Ok(Status { fault: Some(fault), .. })) => Ended::Fault(fault),
             (None, Err(error)) => Ended::Unconfirmed(error),
             (None, Ok(_)) if all_made => Ended::Complete,
-            (None, Ok(_)) if self.stopped.is_some() => Ended::Stopped,
-            (None, Ok(_)) => Ended::WrongNumber { made, asked },
+            (None, Ok(_)) => match self.stopped {
+                Some((_, cause)) => Ended::Stopped(cause),
+                None => Ended::WrongNumber { made, asked },
+            },
         })
     }
 
@@ -412,8 +424,9 @@ impl Run {
         &mut self,
         session: &mut Session,
         observer: &mut dyn Observer,
+        cause: StopCause,
     ) -> Result<(), SessionError> {
-        self.stopped = Some(Instant::now());
+        self.stopped = Some((Instant::now(), cause));
         match session.command(request::Stop, &mut Packets { run: self, observer }) {
             Err(SessionError::Refused { .. }) | Ok(()) => Ok(()),
             Err(error) => Err(error),

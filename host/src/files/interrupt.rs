@@ -1,22 +1,84 @@
-//! Ends the program in order at Ctrl-C or a termination signal.
+//! Ends the program in order at Ctrl-C or another signal.
 //!
-//! A command that can stop by itself is asked to stop. Any other command ends at once, and what it has staged
-//! is removed, as when it fails.
+//! One rule for all commands: a signal that was ignored when the program began, as `nohup` does with the end
+//! of the terminal, stays ignored. At any other, a command that can stop by itself is asked to stop, and any
+//! other command ends at once, and what it has staged is removed, as when it fails. Ctrl-C is the user's wish;
+//! the end of the terminal and a termination are not ([`Signal::is_wish`]).
 //!
 //! # Invariant
 //! An interrupted run leaves no staged file and no folder of its own
 //! (`tests::what_is_staged_at_an_interrupt_is_removed`).
 
+use std::fmt;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError};
-
-/// The exit code of a program that ends at Ctrl-C.
-const INTERRUPTED: i32 = 130;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// The number of the first signal that has come; 0 before.
+static FIRST: AtomicI32 = AtomicI32::new(0);
+
+/// A signal at which the program ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signal {
+    /// Ctrl-C, SIGINT.
+    Interrupt,
+    /// SIGTERM, by which a service manager or a shutdown ends a program.
+    Terminate,
+    /// SIGHUP, the end of the terminal.
+    Hangup,
+}
+
+impl Signal {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Interrupt, Self::Terminate, Self::Hangup];
+
+    /// The number of the signal.
+    #[must_use]
+    pub fn number(self) -> i32 {
+        match self {
+            Self::Hangup => 1,
+            Self::Interrupt => 2,
+            Self::Terminate => 15,
+        }
+    }
+
+    /// Whether the signal is the wish of the user at the terminal.
+    #[must_use]
+    pub fn is_wish(self) -> bool {
+        self == Self::Interrupt
+    }
+
+    /// Whether the program was started so that this signal does nothing. Known on Linux alone.
+    #[must_use]
+    pub fn is_ignored(self) -> bool {
+        let Ok(status) = fs::read_to_string("/proc/self/status") else { return false };
+        let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+        // Signal 1 is bit 0.
+        ignored.is_some_and(|mask| mask >> (self.number() - 1) & 1 == 1)
+    }
+}
+
+impl fmt::Display for Signal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Interrupt => "Ctrl-C",
+            Self::Terminate => "a termination (SIGTERM)",
+            Self::Hangup => "the end of the terminal (SIGHUP)",
+        })
+    }
+}
+
+/// The first signal that has come.
+#[must_use]
+pub fn first() -> Option<Signal> {
+    let number = FIRST.load(Ordering::Relaxed);
+    Signal::ALL.into_iter().find(|signal| signal.number() == number)
+}
 
 /// Files and folders of runs that are under way, in the order in which they were made.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -58,21 +120,12 @@ impl Drop for Noted {
     }
 }
 
-/// Has signals acted on, once in a program. `set` sets the handler.
-///
-/// # Errors
-/// If `set` fails.
-pub fn catch<E>(set: impl FnOnce(fn()) -> Result<(), E>) -> Result<(), E> {
-    static CAUGHT: Once = Once::new();
-    let mut caught = Ok(());
-    CAUGHT.call_once(|| caught = set(act));
-    caught
-}
-
-/// Acts on a signal, and ends the program unless its command was asked to stop.
-fn act() {
-    if let Some(code) = interrupt() {
-        std::process::exit(code);
+/// Acts on a signal, and ends the program unless its command was asked to stop. For a handler of signals.
+pub fn act(signal: Signal) {
+    let _ = FIRST.compare_exchange(0, signal.number(), Ordering::Relaxed, Ordering::Relaxed);
+    if interrupt() {
+        // As shells report a program that a signal has ended.
+        std::process::exit(128 + signal.number());
     }
 }
 
@@ -83,27 +136,16 @@ pub fn stop_flag() -> Arc<AtomicBool> {
     Arc::clone(STOP.get_or_init(Arc::default))
 }
 
-/// Whether the program was started so that the end of the terminal does not end it, as `nohup`
-/// does. A handler of signals would end that.
-#[must_use]
-pub fn ignores_hangup() -> bool {
-    let Ok(status) = fs::read_to_string("/proc/self/status") else { return false };
-    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    // SIGHUP is signal 1, in bit 0.
-    ignored.is_some_and(|mask| mask & 1 == 1)
-}
-
-/// Acts on a signal. `None`: the command was asked to stop. Otherwise what was staged is removed, and
-/// the program must end with this exit code; until then nothing more is staged.
-fn interrupt() -> Option<i32> {
+/// Returns whether the program must end. Then what was staged is removed, and nothing more is staged.
+/// Otherwise the command was asked to stop.
+fn interrupt() -> bool {
     if STOP.get().is_some_and(|stop| !stop.swap(true, Ordering::Relaxed)) {
-        return None;
+        return false;
     }
     let (placing, all) = (undisturbed(), unfinished());
     remove(&all);
     std::mem::forget((placing, all));
-    Some(INTERRUPTED)
+    true
 }
 
 fn remove(paths: &[PathBuf]) {

@@ -177,8 +177,12 @@ impl<'a> Existing<'a> {
     }
 }
 
-/// Other programs take `-` for the standard output, to which no result of this one is written.
-fn refuse_dash(path: &Path) -> Result<(), FileError> {
+/// Refuses the name `-`, which other programs take for the standard output: no result of this one is
+/// written there.
+///
+/// # Errors
+/// [`FileError`] for this name.
+pub fn refuse_dash(path: &Path) -> Result<(), FileError> {
     match path.as_os_str() == "-" {
         true => Err(FileError::kind(path, "no name", "a name; ./- is a file of this name")),
         false => Ok(()),

@@ -15,7 +15,7 @@ use super::{ForeignError, Shared, lock};
 use crate::account::LossCounters;
 use crate::calibration::{CalibrationError, FlatField, KeptFlatField, Settling};
 use crate::capture::{
-    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress,
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
 };
 use crate::clock::Instant;
 use crate::events::{self, Level};
@@ -437,7 +437,7 @@ impl Live {
             (None, Ended::WrongNumber { .. } | Ended::Junk { .. } | Ended::NoFrames { .. }) => {
                 Some(End::Gone(missing.unwrap_or_default()))
             }
-            (None, Ended::Complete | Ended::Stopped) => None,
+            (None, Ended::Complete | Ended::Stopped(_)) => None,
         };
         // A recording goes on in a new file if the measurement was changed, and ends otherwise.
         if end.is_some() || !self.shared.light.is_on() {
@@ -510,12 +510,15 @@ impl Observer for Live {
         self.shared.note(message);
     }
 
-    fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
+    fn watch(&mut self, progress: &Progress) -> ControlFlow<StopCause> {
         self.shared.slot.account(self.earlier + progress.counters);
         let damaged = self.damaged + progress.damaged_packets;
         lock(&self.shared.camera).camera.said.counted(progress.device_time_us, damaged);
         self.look_at_load(progress);
-        if self.goes_on() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        match self.goes_on() {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(StopCause::of_program()),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::calibration::{
     CalibrationError, FlatField, FlatFieldError, Settling, Sweeps, calibrate, measure_flat_field,
 };
 use crate::capture::{
-    Calibration, Capture, CaptureError, CaptureOptions, Ended, Progress, capture,
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, Progress, StopCause, capture,
 };
 use crate::integrate::IntegrateError;
 use crate::session::{IgnorePackets, Session, SessionError};
@@ -157,7 +157,7 @@ pub fn shoot(
     settling: &Settling,
     frames: u32,
     seed: u64,
-    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<StopCause>,
 ) -> Result<Shot, ShotError> {
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
     let calibration = if setup.differential {
@@ -174,7 +174,7 @@ pub fn shoot(
             None => Ok(Shot { session, capture }),
             Some(missing) => Err(ShotError::Lost(missing)),
         },
-        Ended::Stopped => Err(ShotError::Stopped { received: capture.counters.received }),
+        Ended::Stopped(_) => Err(ShotError::Stopped { received: capture.counters.received }),
         Ended::Fault(fault) => Err(ShotError::Fault(fault)),
         Ended::LinkLost(error) | Ended::Unconfirmed(error) => Err(error.into()),
         Ended::WrongNumber { .. } | Ended::Junk { .. } | Ended::NoFrames { .. } => {

@@ -2,8 +2,9 @@
 
 use super::network::Args;
 use crate::progress::Progress;
-use crate::{print, provenance, refused, stop_on_signal};
+use crate::{print, provenance, refused};
 use anyhow::Result;
+use nirspi::files::interrupt;
 use nirspi_eval::train::{Report, Request, Watch, run as train};
 use nirspi_nets::train::{Ended, Entry, Model, Settings};
 use nirspi_recon::words::count;
@@ -23,11 +24,14 @@ pub fn run(args: &Args, model: Model) -> Result<ExitCode> {
         backend: args.backend,
         made: provenance::made().clone(),
     };
-    let stop = stop_on_signal()?;
+    let stop = interrupt::stop_flag();
     let mut shown = Shown { bar: None, stop };
     let report = train(&request, &mut shown).map_err(refused)?;
     drop(shown);
-    args.report.print(&report, &provenance::simulated(), say)
+    let code = args.report.print(&report, &provenance::simulated(), say)?;
+    // A training that the system ended is not one that its user ended.
+    let by_system = interrupt::first().is_some_and(|signal| !signal.is_wish());
+    Ok(if by_system && report.outcome.ended == Ended::Stopped { ExitCode::FAILURE } else { code })
 }
 
 impl Args {

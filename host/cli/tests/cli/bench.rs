@@ -68,10 +68,16 @@ impl Bench {
     /// Runs `nirspi` under limits that a shell sets, `ulimit -n 64` or the like.
     #[cfg(unix)]
     pub fn run_limited(&self, limits: &str, arguments: &[&str]) -> Outcome {
+        self.start_limited(limits, arguments).wait()
+    }
+
+    /// Starts `nirspi` after these commands of a shell.
+    #[cfg(unix)]
+    pub fn start_limited(&self, commands: &str, arguments: &[&str]) -> Process {
         let mut shell = Command::new("sh");
-        let script = format!("{limits}; exec \"$0\" \"$@\"");
+        let script = format!("{commands}; exec \"$0\" \"$@\"");
         shell.args(["-c", &script, env!("CARGO_BIN_EXE_nirspi")]);
-        self.spawn(&mut shell, arguments).wait()
+        self.spawn(&mut shell, arguments)
     }
 
     fn spawn(&self, program: &mut Command, arguments: &[&str]) -> Process {

@@ -15,6 +15,8 @@ mod capture_tcp;
 mod demo;
 mod dishonest_cameras;
 mod doors;
+#[cfg(unix)]
+mod ends;
 mod enhance;
 mod everyday;
 mod foreign_devices;

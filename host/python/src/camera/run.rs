@@ -7,7 +7,7 @@ use crate::measurement::FlatField;
 use crate::work::SIGNALS;
 use nirspi::account::LossCounters;
 use nirspi::calibration::{CalibrationError, Settling};
-use nirspi::capture::{Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, observe};
+use nirspi::capture::{Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause, observe};
 use nirspi::events;
 use nirspi::frame_time::{Clock, HostClock};
 use nirspi::integrate::Integrated;
@@ -140,10 +140,10 @@ impl Observer for Streaming {
         }
     }
 
-    fn watch(&mut self, progress: &Progress) -> ControlFlow<()> {
+    fn watch(&mut self, progress: &Progress) -> ControlFlow<StopCause> {
         *lock(&self.shared.counters) = progress.counters;
         match self.shared.stop.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
+            true => ControlFlow::Break(StopCause::User),
             false => ControlFlow::Continue(()),
         }
     }
@@ -348,7 +348,7 @@ impl Run {
             None => Ok(None),
             Some(Made::Failed(error)) => Err(error.clone_ref(py)),
             Some(Made::Captured(captured)) => {
-                let broke = !matches!(captured.ended, Ended::Complete | Ended::Stopped);
+                let broke = !matches!(captured.ended, Ended::Complete | Ended::Stopped(_));
                 Ok(Some((
                     captured.ended.in_words(),
                     captured.missing(),

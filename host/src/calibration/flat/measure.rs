@@ -2,7 +2,9 @@
 
 use super::{FlatField, FramesError, pattern_noise};
 use crate::calibration::Settling;
-use crate::capture::{Calibration, CaptureError, CaptureOptions, Ended, Progress, capture};
+use crate::capture::{
+    Calibration, CaptureError, CaptureOptions, Ended, Progress, StopCause, capture,
+};
 use crate::integrate::IntegrateError;
 use crate::session::Session;
 use crate::setup::MeasurementSetup;
@@ -97,7 +99,7 @@ struct Camera<'c> {
     session: &'c mut Session,
     setup: &'c MeasurementSetup,
     settling: &'c Settling,
-    watch: &'c mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    watch: &'c mut dyn FnMut(&Progress) -> ControlFlow<StopCause>,
 }
 
 impl Camera<'_> {
@@ -138,7 +140,7 @@ pub fn measure_flat_field(
     setup: &MeasurementSetup,
     settling: &Settling,
     sweeps: Sweeps,
-    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<StopCause>,
 ) -> Result<Measured, FlatFieldError> {
     let mut camera = Camera { session, setup, settling, watch };
     let white = camera.image(sweeps.map)?;
@@ -170,7 +172,7 @@ pub fn measure_dark(
     settling: &Settling,
     flat: FlatField,
     sweeps: u32,
-    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<StopCause>,
 ) -> Result<FlatField, FlatFieldError> {
     let mut camera = Camera { session, setup, settling, watch };
     let (a, b, noise) = camera.pair(sweeps)?;
