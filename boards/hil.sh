@@ -134,7 +134,8 @@ step_silent() {
         sleep 0.1
         waited=$((waited + 1))
     done
-    if kill -INT $host 2>/dev/null; then waited=on; fi
+    # Not INT, which a script ignores for what it starts in the background.
+    if kill -TERM $host 2>/dev/null; then waited=on; fi
     wait $host
     local code=$?
     local title='a host silent for 7 s is told in one line'

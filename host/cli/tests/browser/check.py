@@ -173,7 +173,7 @@ def token(browser, program):
         expect(page.locator("#leds")).to_have_text("LEDs off, stopped")
         page.context.close()
     finally:
-        server.send_signal(signal.SIGINT)
+        server.send_signal(signal.SIGTERM)
         server.wait(10)
 
 
@@ -221,7 +221,7 @@ def main():
                 part(browser, address)
             token(browser, arguments.nirspi)
             phone(browser, address)
-            server.send_signal(signal.SIGINT)
+            server.send_signal(signal.SIGTERM)
             expect(page.locator("#line")).to_contain_text("does not answer")
             expect(page.locator("#leds")).to_have_text(re.compile(r"^LEDs unknown, last seen \d+ s ago: no answer from nirspi serve$"))
             browser.close()

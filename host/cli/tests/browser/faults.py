@@ -302,7 +302,7 @@ def main():
                 browser.new_page().request.post(f"{address}/api/start")
             browser.close()
     finally:
-        server.send_signal(signal.SIGINT)
+        server.send_signal(signal.SIGTERM)
         server.wait(10)
     print(f"{len(chosen) - len(missed)} of {len(chosen)} faults caught")
     sys.exit(bool(missed))

@@ -295,10 +295,6 @@ fn an_interrupted_command_leaves_nothing_of_its_own() {
         Some(outcome)
     };
     for (signal, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
-        if signal == "HUP" && nirspi::files::interrupt::Signal::Hangup.is_ignored() {
-            eprintln!("skipped: started by nohup, under which the program leaves SIGHUP as it is");
-            continue;
-        }
         let outcome = (0..5).find_map(|_| interrupted(signal)).expect("always too late");
         assert_eq!((outcome.code, bench.names()), (Some(code), before.clone()), "{outcome:?}");
     }

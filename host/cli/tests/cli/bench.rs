@@ -1,5 +1,6 @@
 //! A place to run the program in: folders, processes, measurement files.
 
+use nirspi::files::interrupt::Signal;
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use std::fs::{self, File};
 use std::io::{Read, Write};
@@ -55,7 +56,7 @@ impl Bench {
 
     /// Starts `nirspi` with these arguments, in the folder.
     pub fn start(&self, arguments: &[&str]) -> Process {
-        self.spawn(&mut Command::new(env!("CARGO_BIN_EXE_nirspi")), arguments)
+        self.spawn(&mut heeding_signals(env!("CARGO_BIN_EXE_nirspi")), arguments)
     }
 
     /// Runs `nirspi` with these variables in its environment, to its end.
@@ -74,7 +75,7 @@ impl Bench {
     /// Starts `nirspi` after these commands of a shell.
     #[cfg(unix)]
     pub fn start_limited(&self, commands: &str, arguments: &[&str]) -> Process {
-        let mut shell = Command::new("sh");
+        let mut shell = heeding_signals("sh");
         let script = format!("{commands}; exec \"$0\" \"$@\"");
         shell.args(["-c", &script, env!("CARGO_BIN_EXE_nirspi")]);
         self.spawn(&mut shell, arguments)
@@ -109,6 +110,17 @@ impl Bench {
     pub fn run(&self, arguments: &[&str]) -> Outcome {
         self.start(arguments).wait()
     }
+}
+
+/// A program that ignores no signal at its start. Tests that are started by `nohup`, or in the background of a script,
+/// hand on to their programs that they ignore some.
+fn heeding_signals(program: &str) -> Command {
+    if !Signal::ALL.into_iter().any(Signal::is_ignored) {
+        return Command::new(program);
+    }
+    let mut env = Command::new("env");
+    env.args(["--default-signal=INT,TERM,HUP", program]);
+    env
 }
 
 /// A running `nirspi`; killed when dropped.

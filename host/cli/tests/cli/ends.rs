@@ -1,7 +1,6 @@
 //! How a capture ends: by its number of frames, by the user, or by anything else.
 
 use crate::bench::{Bench, Process};
-use nirspi::files::interrupt::Signal;
 use std::time::Duration;
 
 /// A capture without an end, after these commands of a shell, that has frames.
@@ -26,10 +25,6 @@ fn only_the_wish_of_the_user_ends_a_capture_well() {
         ("TERM", 1, "ended by a signal"),
         ("HUP", 1, "ended by a signal"),
     ] {
-        if signal == "HUP" && Signal::Hangup.is_ignored() {
-            eprintln!("skipped: started by nohup, under which the program leaves SIGHUP as it is");
-            continue;
-        }
         let bench = Bench::new();
         let capture = endless(&bench, "true");
         capture.signal(signal);
