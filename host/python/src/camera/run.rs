@@ -7,7 +7,9 @@ use crate::measurement::FlatField;
 use crate::work::SIGNALS;
 use nirspi::account::LossCounters;
 use nirspi::calibration::{CalibrationError, Settling};
-use nirspi::capture::{Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause, observe};
+use nirspi::capture::{
+    Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause, observe,
+};
 use nirspi::events;
 use nirspi::frame_time::{Clock, HostClock};
 use nirspi::integrate::Integrated;
