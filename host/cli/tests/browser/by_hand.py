@@ -647,7 +647,8 @@ def silent(told):
     page.wait_for_function("() => asks.length")
     page.evaluate("() => tell(told, 9000)")
     page.wait_for_timeout(100)
-    assert re.fullmatch(r"LEDs unknown, last seen (9|10) s ago.*", leds.inner_text()), leds.inner_text()
+    # On a busy machine a little later.
+    assert re.fullmatch(r"LEDs unknown, last seen (9|1\d) s ago.*", leds.inner_text()), leds.inner_text()
     # What comes in time holds again, the same image too.
     page.evaluate("() => { isSilent = false; }")
     expect(leds).to_have_text("LEDs off, stopped")
