@@ -90,7 +90,7 @@ pub fn read_at_most(path: &Path, most_bytes: u64) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The text of a file that [`read_small`] reads, by [`decode`].
+/// The text of a file that [`read_small`] reads, in UTF-8 or, by its mark, in UTF-16.
 ///
 /// # Errors
 /// As [`read_small`]; [`ErrorKind::InvalidData`](std::io::ErrorKind::InvalidData) for a file that is
