@@ -51,6 +51,15 @@ def test_no_image_of_training_is_one_that_is_held_out_not_even_in_another_stack(
             assert not set(stack.groups[mask]) & set(stack.groups[~mask])
 
 
+def test_a_blank_image_connects_nothing(tmp_path):
+    blank = data.read([letters(tmp_path / "a.npz")])[0]
+    # The first image of each group shows nothing; two groups share a character.
+    blank.images[::4] = 0
+    blank.images[9] = blank.images[13]
+    of = data.families([blank])
+    assert len(set(of.values())) == 5 and of[(0, 2)] == of[(0, 3)]
+
+
 def test_the_split_follows_from_the_seed_and_the_stack(tmp_path):
     stacks = data.read([letters(tmp_path / "a.npz", groups=40)])
     first = data.split(stacks, 0.1, 1)[0]

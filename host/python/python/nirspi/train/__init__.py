@@ -108,7 +108,7 @@ def train(
     scenes = Scenes(
         stacks, masks, read, shapes=chosen.shapes, camera_share=chosen.camera_share, device=device
     )
-    run = Run(chosen, scenes, enlarger(weights, device) if weights else None)
+    run = Run(chosen, scenes, enlarger(fsrcnn, weights, device) if fsrcnn else None)
     folder = Folder(Path(out))
     if resume:
         run.resume(folder.load(device))
