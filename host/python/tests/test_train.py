@@ -23,7 +23,7 @@ from nirspi.train import data, folder, networks  # noqa: E402
 from nirspi.train.optics import conditions  # noqa: E402
 from nirspi.train.run import Run, Settings  # noqa: E402
 from nirspi.train.scenes import Scenes  # noqa: E402
-from nirspi.train.tasks import DISCRIMINATOR_RATE, TASKS, enlarger  # noqa: E402
+from nirspi.train.tasks import DISCRIMINATOR_RATE, TASKS  # noqa: E402
 
 DEBLURRERS = [name for name, task in TASKS.items() if task.enlarges]
 WIDTHS = {"fsrcnn": (8, 4), "estimator": (4, 6, 8, 8), "classifier": (6, 8, 12)} | dict.fromkeys(
@@ -183,24 +183,6 @@ def test_the_gans_judge_learns_to_tell_scenes_from_what_the_generator_makes():
     assert np.mean(told[:5]) > 0.5 > np.mean(told[-10:]) + 0.1, told
 
 
-@pytest.mark.parametrize("network", list(TASKS))
-def test_an_image_gives_the_same_in_whatever_batch_it_comes(network):
-    torch.manual_seed(5)
-    net = TASKS[network].network(None, WIDTHS[network])
-    for parameter in net.parameters():
-        parameter.data += 0.05 * torch.randn_like(parameter)
-    side, channels = {"fsrcnn": (32, 3), "estimator": (32, 1)}.get(network, (64, 1))
-    inputs = [torch.rand(5, channels, side, side) * torch.linspace(0.2, 1, 5)[:, None, None, None]]
-    if network in DEBLURRERS:
-        inputs += [torch.rand(5, 1, 64, 64), torch.rand(5, 6)]
-    with torch.no_grad():
-        whole = net(*inputs)
-        apart = torch.cat([net(*(array[i : i + 1] for array in inputs)) for i in range(5)])
-        turned = net(*(array.flip(0) for array in inputs)).flip(0)
-    assert (whole[0] - whole[1]).abs().max() > 1e-3
-    assert (whole - apart).abs().max() < 1e-5 and (whole - turned).abs().max() < 1e-5
-
-
 @pytest.mark.parametrize("network", ["diffusion", "gan"])
 def test_a_run_that_was_stopped_goes_on_to_the_very_same_weights(network):
     settings = tiny(network, steps=24, judge_every=10, log_every=4)
@@ -263,66 +245,6 @@ def test_training_ends_when_held_out_examples_get_no_better():
 def test_settings_that_cannot_be_are_named(wrong, line):
     with pytest.raises(ns.Error, match=line):
         Memory().train(Settings(**vars(tiny("fsrcnn")) | wrong))
-
-
-@pytest.mark.parametrize("network", list(TASKS))
-def test_networks_are_trained_at_the_size_of_the_shipped_ones(network):
-    shipped = ROOT / "host/nets/weights"
-    place = (
-        shipped if network in ("fsrcnn", "diffusion", "estimator", "classifier") else shipped / "baselines"
-    )
-    state = folder.tensors(place / f"{network}.safetensors")
-    net = TASKS[network].network(None, TASKS[network].widths)
-    assert {name: tensor.shape for name, tensor in net.state_dict().items()} == {
-        name: t.shape for name, t in state.items()
-    }
-    net.load_state_dict(state)
-
-
-@pytest.mark.parametrize(
-    ("name", "net"),
-    [
-        ("unet", lambda: networks.UNet((8, 12, 16), 2, 8)),
-        ("fsrcnn", lambda: networks.FSRCNN(8, 5, 3)),
-        ("estimator", lambda: networks.Estimator((4, 6, 8, 10), hidden=7)),
-        ("classifier", lambda: networks.Classifier((4, 6, 8))),
-    ],
-)
-def test_networks_give_the_numbers_that_the_program_is_tested_with(name, net):
-    at = ROOT / "host/nets/tests/pytorch"
-    net, pairs = net(), folder.tensors(at / f"{name}_reference.safetensors")
-    net.load_state_dict(folder.tensors(at / f"{name}.safetensors"))
-    inputs = [pairs[key] for key in sorted(pairs) if key.startswith("in")]
-    with torch.no_grad():
-        found = net(*inputs)
-    assert (found - pairs[max(key for key in pairs if key.startswith("out"))]).abs().max() < 1e-5
-
-
-def test_weights_of_another_network_or_form_are_refused_as_fsrcnn(tmp_path):
-    at = ROOT / "host/nets/tests/pytorch"
-    good = folder.tensors(at / "fsrcnn.safetensors")
-
-    def refused(state):
-        with pytest.raises(ns.Error, match="^own.safetensors: ") as error:
-            enlarger("own.safetensors", state, "cpu")
-        return str(error.value)
-
-    # Any size of the network is good.
-    reference = folder.tensors(at / "fsrcnn_reference.safetensors")
-    found = enlarger("own.safetensors", good, "cpu")(reference["in0"])
-    assert (found - reference["out0"]).abs().max() < 1e-5 and not found.requires_grad
-    other = "weights of another network, expected those of fsrcnn"
-    for name in ("estimator", "classifier", "unet", "prior"):
-        assert other in refused(folder.tensors(at / f"{name}.safetensors"))
-    for name in good:
-        bare = {key: tensor for key, tensor in good.items() if key != name}
-        assert other in refused(bare)
-        assert other in refused(good | {name: good[name].flatten()[:-1]})
-        assert other in refused(good | {name: torch.tensor(1.0)})
-    assert other in refused(good | {"fc.weight": torch.zeros(2, 2)})
-    bad = good["expand.bias"].clone()
-    bad[-1] = float("nan")
-    assert "expand.bias holds a value that is not finite" in refused(good | {"expand.bias": bad})
 
 
 def run(tmp_path, *more, network="fsrcnn", width="4,2"):
@@ -529,22 +451,57 @@ def test_what_cannot_be_trained_is_named_and_leaves_nothing(tmp_path, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_control_c_keeps_the_run_which_then_goes_on(tmp_path, monkeypatch):
-    once = Run.once
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_that_ends_a_run_keeps_it_and_it_goes_on(name, tmp_path, monkeypatch):
+    number = getattr(signal, name)
+    once, before = Run.once, signal.getsignal(number)
 
     def interrupted(self):
         if self.step == 5:
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
         return once(self)
 
     monkeypatch.setattr(Run, "once", interrupted)
-    assert run(tmp_path, "--steps", 12) == 0
+    # Ctrl-C is the user's wish; the others are not.
+    assert run(tmp_path, "--steps", 12) == (0 if number == signal.SIGINT else 1)
     state = folder.Folder(tmp_path / "run").load("cpu")
     assert 6 <= state["step"] < 12
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(number) is before
     monkeypatch.undo()
     assert run(tmp_path, "--steps", 12, "--resume") == 0
     assert steps(tmp_path) == [4, 8, 12]
+
+
+def test_a_signal_that_is_ignored_stays_ignored(tmp_path, monkeypatch):
+    once = Run.once
+
+    def interrupted(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return once(self)
+
+    monkeypatch.setattr(Run, "once", interrupted)
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        assert run(tmp_path, "--steps", 4) == 0
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert steps(tmp_path) == [4]
+
+
+def test_pairs_and_characters_that_the_program_makes_are_trained_on(tmp_path, cli):
+    letters(tmp_path / "own.npz", groups=10)
+    options = ["--held-out", "0.1", "--count", "6", "--characters", "letters", "--out", "pairs.npz"]
+    command_line = [cli, "pairs", "--data", "own.npz", *options]
+    subprocess.run(command_line, cwd=tmp_path, check=True, capture_output=True)
+    (written,), (given,) = data.read([tmp_path / "letters"]), data.read([tmp_path / "own.npz"])
+    assert (written.images == given.images).all() and (written.groups == given.groups).all()
+    assert (written.labels == given.labels).all()
+    made = tmp_path / "pairs.npz"
+    with np.load(made) as file:
+        assert file["x"].shape == (6, 64, 64) and file["y"].shape == (6, 32, 32)
+    trained = ["--data", tmp_path / "letters", "--pairs", made, "--camera-share", 1, "--steps", 4]
+    assert run(tmp_path, *trained) == 0
 
 
 def test_the_program_computes_with_the_weights_of_a_run_what_pytorch_does(tmp_path, cli):
