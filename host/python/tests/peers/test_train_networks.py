@@ -1,6 +1,10 @@
 """The networks that python -m nirspi.train trains: sizes, numbers, and whose weights are refused."""
 
+import subprocess
+
+import numpy as np
 import pytest
+from test_train_data import pairs
 
 import nirspi as ns
 from conftest import ROOT
@@ -9,7 +13,8 @@ torch = pytest.importorskip("torch", reason="skipped: no torch (pip install torc
 
 from test_train import DEBLURRERS, WIDTHS  # noqa: E402
 
-from nirspi.train import folder, networks  # noqa: E402
+from nirspi.train import data, folder, networks  # noqa: E402
+from nirspi.train.scenes import Scenes  # noqa: E402
 from nirspi.train.tasks import TASKS, enlarger  # noqa: E402
 
 
@@ -90,3 +95,30 @@ def test_weights_of_another_network_or_form_are_refused_as_fsrcnn(tmp_path):
     bad = good["expand.bias"].clone()
     bad[-1] = float("nan")
     assert "expand.bias holds a value that is not finite" in refused(good | {"expand.bias": bad})
+
+
+def test_the_program_gives_fsrcnn_the_depth_that_training_gives_it(tmp_path, cli):
+    torch.manual_seed(5)
+    net = networks.FSRCNN(8, 4)
+    # As if training had made much of depth.
+    for parameter in net.parameters():
+        parameter.data *= 2
+    weights = tmp_path / "weights.safetensors"
+    about = {"model": "fsrcnn", "version": "1", "recipe": "random"}
+    folder.whole(weights, folder.weights(net.state_dict(), about))
+    # Near, far, farther than 3 m, and zones without depth.
+    read = data.pairs([pairs(tmp_path / "p.npz", [-1], [-1])], [], [])
+    read["depth_m"][0] = 0.07 * np.arange(1, 65).reshape(8, 8)
+    read["depth_m"][0].flat[2::5] = 0
+    batch = Scenes([], [], read, camera_share=1.0).readings(1)
+    with torch.no_grad():
+        expected = net(torch.cat((batch.y, batch.depth), 1)).clamp(0, 1)[0, 0]
+        blind = net(torch.cat((batch.y, 0 * batch.depth), 1)).clamp(0, 1)[0, 0]
+    np.save(tmp_path / "in.npy", read["y"][0])
+    np.save(tmp_path / "depth.npy", read["depth_m"])
+    options = ["--depth", "depth.npy", "--weights", weights, "--backend", "cpu", "--out", "out.npy"]
+    command_line = [cli, "upscale", "in.npy", *options]
+    subprocess.run(command_line, cwd=tmp_path, check=True, capture_output=True)
+    found = torch.from_numpy(np.load(tmp_path / "out.npy").reshape(64, 64))
+    assert (blind - expected).abs().max() > 1e-2
+    assert (found - expected).abs().max() < 1e-4
