@@ -11,7 +11,6 @@ steps=(
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
     "features        the library alone, and with its features that bring the others"
     "package         each library crate makes a package; crates.io"
-    "training        networks on burn, and the commands that need it"
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
@@ -223,12 +222,6 @@ step_release_folder() {
     ls -l target/package/firmware
 }
 
-step_training() {
-    cargo test --locked -p nirspi-nets --features train --lib
-    # Their code is checked by the lints; running them compiles burn for every crate above the networks.
-    echo "skipped: cargo test -p nirspi-eval -p nirspi-cli --no-default-features --features train train::"
-}
-
 step_emulation() {
     emulated_firmware
     cargo test --locked --test budgets --test qemu --test faults -- --nocapture
@@ -261,8 +254,6 @@ step_application() {
 # The whole workspace at once, so that each dependency is checked once, for the documentation too.
 step_lints() {
     cargo clippy --locked --workspace --all-targets -- -D warnings
-    cargo clippy --locked --workspace --all-targets \
-        --features nirspi-nets/train,nirspi/train,nirspi-eval/train,nirspi-cli/train -- -D warnings
     local name
     for name in $(boards); do
         if rustup target list --installed | grep -qx "$(fact "$name" target)"; then

@@ -6,12 +6,11 @@ use nirspi_wire::version;
 use std::fmt;
 
 /// Features of this library, and whether this build has each one.
-const FEATURES: [(&str, bool); 6] = [
+const FEATURES: [(&str, bool); 5] = [
     ("baselines", cfg!(feature = "baselines")),
     ("flash", cfg!(feature = "flash")),
     ("gpu", cfg!(feature = "gpu")),
     ("hdf5", cfg!(feature = "hdf5")),
-    ("train", cfg!(feature = "train")),
     ("wgpu", cfg!(feature = "wgpu")),
 ];
 
@@ -25,7 +24,7 @@ pub struct About {
     pub commit: Option<&'static str>,
     /// The oldest and the newest protocol version that this build speaks.
     pub protocol: [u16; 2],
-    /// Those of the features `baselines`, `flash`, `gpu`, `hdf5`, `train` and `wgpu` that this build has.
+    /// Those of the features `baselines`, `flash`, `gpu`, `hdf5` and `wgpu` that this build has.
     pub features: Vec<&'static str>,
     /// The weights that this build contains; empty if the embedded files are damaged.
     #[cfg(feature = "enhance")]

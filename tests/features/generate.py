@@ -20,12 +20,11 @@ import sys
 
 FOLDER = pathlib.Path(__file__).parent
 WHOLE = ["test"]
-# Commands whose packages depend on this one: CI's steps `gpu`, `rtl`, `training` and `mie`.
+# Commands whose packages depend on this one: CI's steps `gpu`, `rtl` and `mie`.
 GPU = ["nirspi-gpu", "nirspi-recon", "nirspi-nets", "nirspi-eval", "nirspi-cli"]
 PARTS = [
     ["test", *(f"-p{name}" for name in GPU), "--features", "nirspi-cli/wgpu", "--lib", "--test", "cli"],
     ["test", "-p", "nirspi-hdl-sim", "-p", "nirspi-tests-rtl"],
-    ["test", "-p", "nirspi-nets", "--features", "train"],
     ["test", "-p", "nirspi-optics"],
 ]
 # Its feature `wgpu` is what the first part is for, and would bring Vulkan into a plain `cargo test`.

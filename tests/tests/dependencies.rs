@@ -110,7 +110,7 @@ fn ordinary(package: &str) -> Vec<String> {
 #[test]
 fn the_command_line_computes_nothing() {
     let used = ordinary("nirspi-cli");
-    for numeric in ["nalgebra", "rand", "rand_distr", "rand_pcg", "rayon", "burn", "cubecl"] {
+    for numeric in ["nalgebra", "rand", "rand_distr", "rand_pcg", "rayon", "cubecl"] {
         assert!(!used.iter().any(|used| used == numeric), "nirspi-cli -> {numeric}");
     }
 }
@@ -209,7 +209,7 @@ fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest()
 }
 
 /// Crates for computation. The program leaves computation to the libraries.
-const COMPUTING: [&str; 6] = ["nalgebra", "rand", "rand_distr", "rand_pcg", "rayon", "burn"];
+const COMPUTING: [&str; 5] = ["nalgebra", "rand", "rand_distr", "rand_pcg", "rayon"];
 
 /// The program's ordinary dependencies on crates for computation.
 fn computing(packages: &[Value]) -> Vec<&str> {

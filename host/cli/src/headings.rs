@@ -10,7 +10,7 @@ const HEADINGS: [(&str, &[&str]); 8] = [
         &["frames", "light", "sum", "sampling", "order", "orders", "sweeps", "white", "dark"],
     ),
     ("Input", &["resize", "depth"]),
-    ("Networks", &["ancestral", "inception"]),
+    ("Networks", &["ancestral"]),
     ("One sphere", &["mie", "x", "m-re", "m-im"]),
     ("Photon budget", &["budget", "reflectance", "exposure-us"]),
     ("Rain simulator", &["uniformity", "rig", "tilt-deg"]),

@@ -26,6 +26,7 @@ mod method;
 mod metrics;
 mod networks;
 mod packaging;
+mod pairs;
 mod print;
 mod progress;
 mod provenance;
@@ -41,7 +42,6 @@ mod settings;
 mod setup;
 mod signals;
 mod source;
-mod train;
 mod update;
 mod upscale;
 
@@ -104,9 +104,9 @@ commands! {
     Metrics(metrics::Args) => metrics::run,
     Rain(rain::Args) => rain::run,
     Range(range::Args) => range::run,
+    Pairs(pairs::Args) => pairs::run,
     Bench(bench::Args) => bench::run,
     Eval(eval::EvalArgs) => eval::run,
-    Train(train::TrainArgs) => train::run,
     Completions(packaging::CompletionsArgs) => packaging::completions,
     Man(packaging::ManArgs) => packaging::man,
 }

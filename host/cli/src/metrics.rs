@@ -1,11 +1,9 @@
 //! `nirspi metrics`: the similarity of two stacks of images, one by one and as sets.
 
-use super::progress::Progress;
 use super::report::ReportArgs;
 use super::{print, provenance, refused};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
-use nirspi_eval::Fid;
 use nirspi_eval::sets::{self, Align, Comparison, Options, Scaled};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,13 +14,12 @@ use std::process::ExitCode;
 /// A stack is a .npy file of (N, H, W) or (H, W) numbers, a .npz file with `recon`, `image` or `images`, a PNG or JPEG
 /// picture, a folder of pictures, or a folder that `reconstruct` or `demo` has written. Numbers are in [0, 1]; nothing is
 /// scaled or fitted without --data-range or --align. The Fréchet character distance uses the features of this program's
-/// classifier and needs at least two images of 64 x 64 pixels; FID needs your own Inception weights. The report is JSON.
+/// classifier and needs at least two images of 64 x 64 pixels. The report is JSON.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy --align gain-offset\n\
     \x20 nirspi metrics full/ third/ --align gain-offset\n\
-    \x20 nirspi metrics sharp.npy deblurred.npy --labels labels.npy --legibility\n\
-    \x20 nirspi metrics sharp.npy deblurred.npy --inception inception.safetensors")]
+    \x20 nirspi metrics sharp.npy deblurred.npy --labels labels.npy --legibility")]
 pub struct Args {
     /// The images as they should be
     reference: PathBuf,
@@ -31,10 +28,6 @@ pub struct Args {
     /// Which character each image shows, (N,), 0 to 61 for 0-9, A-Z, a-z: for the character accuracy
     #[arg(long, value_name = "FILE.npy")]
     labels: Option<PathBuf>,
-    /// Weights of Inception-v3 in safetensors with torchvision's names, for FID.
-    /// host/nets/scripts/inception_to_safetensors.py converts the file of pytorch-fid
-    #[arg(long, value_name = "FILE")]
-    inception: Option<PathBuf>,
     /// Let Tesseract read the characters, if it is installed on this machine
     #[arg(long, requires = "labels")]
     legibility: bool,
@@ -72,13 +65,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let named = || args.test.display().to_string();
     let read_labels = |path: &PathBuf| sets::read_labels(path, test.count);
     let labels = args.labels.as_ref().map(read_labels).transpose()?;
-    let fid = args.inception.as_deref().map(Fid::read).transpose()?;
-    let options =
-        Options { labels: labels.as_deref(), fid: fid.as_ref(), legibility: args.legibility };
-    let bar = Progress::of("inception", 2 * test.count, "images");
-    let comparison =
-        sets::compare(&reference, &test, &options, &|| bar.add(1)).with_context(named)?;
-    drop(bar);
+    let options = Options { labels: labels.as_deref(), legibility: args.legibility };
+    let comparison = sets::compare(&reference, &test, &options).with_context(named)?;
     let align = if args.align.is_some() { "gain-offset" } else { "none" };
     print::json(&Report { align, data_range, comparison }, &provenance::computed())?;
     Ok(ExitCode::SUCCESS)

@@ -65,13 +65,6 @@ impl Progress {
         Self { bar, _lines: lines }
     }
 
-    /// The number of things done before, in an earlier run.
-    #[cfg(feature = "train")]
-    pub fn start_at(&self, done: u64) {
-        self.bar.set_position(done);
-        self.bar.reset_eta();
-    }
-
     /// The number of things done.
     pub fn set(&self, done: impl TryInto<u64>) {
         self.bar.set_position(done.try_into().unwrap_or(u64::MAX));

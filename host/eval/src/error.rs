@@ -138,7 +138,6 @@ from_libraries!(
     nirspi_nets::MeasuredRowsError,
     nirspi_nets::classical::ClassicalError,
     nirspi_nets::data::DataError,
-    nirspi_nets::degrade::DegradeError,
     nirspi_nets::device::DeviceError,
     nirspi_nets::images::ImagesError,
     nirspi_nets::interval::NoIntervals,
@@ -166,12 +165,6 @@ from_libraries!(
 
 #[cfg(feature = "gpu")]
 from_libraries!(nirspi_nets::DeviceEnhancerError);
-
-#[cfg(feature = "train")]
-from_libraries!(nirspi_nets::metrics::inception::ImageSize, nirspi_nets::train::TrainError);
-
-#[cfg(not(feature = "train"))]
-from_libraries!(nirspi_nets::metrics::inception::NotBuilt);
 
 #[cfg(test)]
 mod tests {

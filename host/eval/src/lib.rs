@@ -18,7 +18,6 @@
 //! | [`mod@bench`] | how many frames a second does this machine reconstruct and enhance? |
 //! | [`camera_model`] | what follows from a camera description? |
 //! | [`rain`] | what does rain do to light, and to the photon budget of a pixel? |
-//! | [`train`] | how does a network learn from a user's characters? |
 //!
 //! [`shot`] takes the pictures of the tables through the virtual camera, of targets in several
 //! [`typefaces`]. [`pictures`] enhances the pictures. [`bootstrap`] and [`estimate`] give the
@@ -39,16 +38,13 @@ pub mod shot;
 pub mod table1;
 pub mod table3;
 pub mod table4;
-pub mod train;
 pub mod trust;
 pub mod typefaces;
 pub mod video;
 
 mod error;
-mod fid;
 
 pub use error::{EvalError, Result};
-pub use fid::Fid;
 
 /// The number of lines of a chart that can be told apart by colour and dashes.
 #[cfg(test)]

@@ -3,15 +3,13 @@
 //!
 //! # Invariant
 //! A figure that cannot be computed is `null`, and `notes` says why
-//! (`tests::a_figure_that_cannot_be_computed_is_noted`). Only the number computed with the user's
-//! Inception weights is called FID.
+//! (`tests::a_figure_that_cannot_be_computed_is_noted`).
 
 mod images;
 
 pub use images::{Align, Scaled, read_images, scaled};
 
 use crate::error::{EvalError, Result};
-use crate::fid::Fid;
 use images::outside;
 use nirspi::files::npy::{Stack, read_list};
 use nirspi::legibility::{Judge, LegibilityError};
@@ -40,8 +38,6 @@ pub struct Sets {
     pub frechet_character_distance: Option<f64>,
     /// Share of the images in which the classifier recognises the labelled character.
     pub character_accuracy: Option<Shares>,
-    /// FID with the user's Inception weights.
-    pub fid: Option<f64>,
     /// The name of the character reader.
     pub legibility_judge: Option<String>,
     /// Share of the images in which the character reader recognises the labelled character.
@@ -52,22 +48,12 @@ pub struct Sets {
 
 impl Sets {
     /// Compares two stacks of the same shape, with the further figures that `options` requests.
-    /// `done` is called after each image that Inception has processed, twice the number of images
-    /// in total.
     ///
     /// # Errors
     /// [`EvalError`] for weights that do not fit, or a character reader that fails.
-    fn compare(
-        reference: &Stack,
-        test: &Stack,
-        options: &Options<'_>,
-        done: &dyn Fn(),
-    ) -> Result<Self> {
+    fn compare(reference: &Stack, test: &Stack, options: &Options<'_>) -> Result<Self> {
         let mut sets = Self::default();
         sets.judge_characters(reference, test, options.labels)?;
-        if let Some(fid) = options.fid {
-            sets.measure_fid(fid, reference, test, done)?;
-        }
         if let Some(labels) = options.labels.filter(|_| options.legibility) {
             sets.have_read(reference, test, labels)?;
         }
@@ -100,21 +86,6 @@ impl Sets {
             reference: agreement(&a.classes, labels),
             test: agreement(&b.classes, labels),
         });
-        Ok(())
-    }
-
-    fn measure_fid(
-        &mut self,
-        fid: &Fid,
-        reference: &Stack,
-        test: &Stack,
-        done: &dyn Fn(),
-    ) -> Result<()> {
-        self.notes.extend(fid.note());
-        let size = (test.height, test.width);
-        let [a, b] =
-            [reference, test].map(|stack| stack.values.chunks_exact(test.height * test.width));
-        self.fid = Some(fid.distance(a, b, size, done)?);
         Ok(())
     }
 
@@ -203,24 +174,16 @@ pub struct Comparison {
 pub struct Options<'a> {
     /// The character in each image, for the character accuracy.
     pub labels: Option<&'a [u8]>,
-    /// Inception-v3 with the user's weights, for FID.
-    pub fid: Option<&'a Fid>,
     /// Whether Tesseract reads the characters.
     pub legibility: bool,
 }
 
-/// Compares two stacks of images in `[0, 1]` of the same shape, without scaling or fitting. `done`
-/// is called after each image that Inception has processed, twice the number of images in total.
+/// Compares two stacks of images in `[0, 1]` of the same shape, without scaling or fitting.
 ///
 /// # Errors
 /// [`EvalError`] for stacks of different shapes, images too small for SSIM, or weights that do not
 /// fit.
-pub fn compare(
-    reference: &Stack,
-    test: &Stack,
-    options: &Options<'_>,
-    done: &dyn Fn(),
-) -> Result<Comparison> {
+pub fn compare(reference: &Stack, test: &Stack, options: &Options<'_>) -> Result<Comparison> {
     let shape = |s: &Stack| (s.count, s.height, s.width);
     if shape(reference) != shape(test) {
         let (found, expected) = (shape(test), shape(reference));
@@ -245,7 +208,7 @@ pub fn compare(
         width,
         mean_psnr_db: (!finite.is_empty()).then(|| mean(&finite)),
         mean_ssim: each.iter().map(|image| image.ssim).sum::<f64>() / each.len() as f64,
-        sets: Sets::compare(reference, test, options, done)?,
+        sets: Sets::compare(reference, test, options)?,
         each,
     })
 }
@@ -263,12 +226,12 @@ mod tests {
     #[test]
     fn a_figure_that_cannot_be_computed_is_noted() {
         let small = stack(2, 16, |at| (at % 7) as f32 / 7.0);
-        let same = compare(&small, &small, &Options::default(), &|| {}).unwrap();
+        let same = compare(&small, &small, &Options::default()).unwrap();
         assert_eq!((same.mean_psnr_db, same.mean_ssim), (None, 1.0));
         assert_eq!(same.sets.frechet_character_distance, None);
         assert_eq!(same.sets.notes, ["the classifier judges images of 64 x 64, not 16 x 16"]);
         let one = stack(1, 64, |at| (at % 7) as f32 / 7.0);
-        let one = compare(&one, &one, &Options::default(), &|| {}).unwrap();
+        let one = compare(&one, &one, &Options::default()).unwrap();
         assert!(one.sets.notes[0].starts_with("no Fréchet character distance: "), "{:?}", one.sets);
     }
 
@@ -276,10 +239,10 @@ mod tests {
     fn identical_images_do_not_enter_the_mean_of_the_psnr() {
         let reference = stack(2, 16, |at| (at % 16) as f32 / 32.0);
         let test = stack(2, 16, |at| (at % 16) as f32 / 32.0 + if at < 256 { 0.0 } else { 0.1 });
-        let report = compare(&reference, &test, &Options::default(), &|| {}).unwrap();
+        let report = compare(&reference, &test, &Options::default()).unwrap();
         assert_eq!(report.each[0].psnr_db, None);
         assert!((report.mean_psnr_db.unwrap() - 20.0).abs() < 1e-4, "{report:?}");
-        let wide = compare(&reference, &stack(1, 16, |_| 0.0), &Options::default(), &|| {});
+        let wide = compare(&reference, &stack(1, 16, |_| 0.0), &Options::default());
         let told = "shape (1, 16, 16), expected (2, 16, 16)";
         assert_eq!(wide.unwrap_err().to_string(), told);
     }

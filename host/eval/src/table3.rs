@@ -13,7 +13,6 @@ pub use rows::{Difference, Row};
 use crate::DISTANCES_M;
 use crate::bootstrap::{DRAWS, Redraws};
 use crate::error::{EvalError, Result};
-use crate::fid::Fid;
 use crate::pictures::{Enhancers, Picture};
 use crate::quality::halved;
 use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
@@ -31,7 +30,6 @@ use nirspi_recon::Image;
 use rayon::prelude::*;
 use rows::{Measured, Statistics};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 /// Settings of the measurement.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,8 +42,6 @@ pub struct Settings {
     pub exposure: Exposure,
     /// Steps of the ancestral sampler, the paper's method; 0 leaves out its row. The paper has 500.
     pub ancestral_steps: u32,
-    /// Inception-v3's weights, for FID; takes about a second for each picture.
-    pub inception: Option<PathBuf>,
 }
 
 impl Settings {
@@ -127,7 +123,7 @@ impl Table {
     /// # Errors
     /// `EvalError` for weights that cannot be read, or a capture that fails.
     pub fn take(settings: Settings, done: &(dyn Fn() + Sync)) -> Result<Self> {
-        let sets = Sets::new(settings.inception.as_deref())?;
+        let sets = Sets::new()?;
         let enhancers = Enhancers::new(settings.ancestral_steps)?;
         let typefaces = typefaces::all();
         let exposure = settings.exposure.clone();
@@ -180,7 +176,7 @@ impl Table {
             ancestral_steps: settings.ancestral_steps,
             frames: settings.exposure.frames,
             seed: settings.exposure.seed,
-            reading: reading(&settings.camera, &rows, &differences, settings.inception.is_some()),
+            reading: reading(&settings.camera, &rows, &differences),
             rows,
             differences,
         })
@@ -327,13 +323,11 @@ fn judged(
 /// The judges of sets of 64 x 64 pictures.
 struct Sets {
     characters: CharacterJudge,
-    fid: Option<Fid>,
 }
 
 impl Sets {
-    fn new(inception: Option<&Path>) -> Result<Self> {
-        let fid = inception.map(Fid::read).transpose()?;
-        Ok(Self { characters: CharacterJudge::new(&Weights::embedded("classifier")?)?, fid })
+    fn new() -> Result<Self> {
+        Ok(Self { characters: CharacterJudge::new(&Weights::embedded("classifier")?)? })
     }
 
     /// The classifier's features of pictures.
@@ -361,14 +355,6 @@ impl Sets {
         };
         Ok(self.characters.distance(&some(truth), &some(found))?)
     }
-
-    /// FID, if there are weights.
-    fn fid(&self, truth: &[&[f32]], found: &[&[f32]]) -> Result<Option<f64>> {
-        let fid = |fid: &Fid| {
-            fid.distance(truth.iter().copied(), found.iter().copied(), (64, 64), &|| {})
-        };
-        self.fid.as_ref().map(fid).transpose()
-    }
 }
 
 /// Scene number `i`: another character, typeface, rain and noise.
@@ -389,12 +375,7 @@ fn take(
 }
 
 /// The effects of rain in this table, and their limits.
-fn reading(
-    camera: &CameraModel,
-    rows: &[Row],
-    differences: &[Difference],
-    inception: bool,
-) -> Vec<String> {
+fn reading(camera: &CameraModel, rows: &[Row], differences: &[Difference]) -> Vec<String> {
     let projector = camera.projector();
     let blur =
         DISTANCES_M.map(|m| format!("{:.0} mm at {m} m", projector.blur_mm(m * 1e3))).join(", ");
@@ -444,13 +425,8 @@ fn reading(
         "diffusion is one step of a larger UNet that minimises the error, trained much longer: it shows what nirspi gives, and is \
          no comparison of methods"
             .to_owned(),
+        "the Fréchet character distance is of our own classifier's features, and is not FID".to_owned(),
     ]);
-    if !inception {
-        lines.push(
-            "the Fréchet character distance is of our own classifier's features and no FID; --inception gives that one"
-                .to_owned(),
-        );
-    }
     lines
 }
 
@@ -462,8 +438,7 @@ mod tests {
     fn rain_costs_quality_and_the_same_scenes_come_again() {
         let exposure = Exposure { air: "heavy".parse().unwrap(), frames: 4, seed: 1 };
         let camera = CameraModel::default();
-        let settings =
-            Settings { scenes: 2, camera, exposure, ancestral_steps: 2, inception: None };
+        let settings = Settings { scenes: 2, camera, exposure, ancestral_steps: 2 };
         let report = || {
             let table = Table::take(settings.clone(), &|| {}).unwrap();
             serde_json::to_value(table.report().unwrap()).unwrap()
@@ -476,7 +451,6 @@ mod tests {
         for row in rows {
             let psnr = &row["psnr_db"];
             assert!(psnr["low"].as_f64() <= psnr["high"].as_f64(), "{row}");
-            assert!(row["fid"].is_null(), "{row}");
         }
         // "all" is the mean of the three distances.
         for kind in rows.chunks_exact(4) {

@@ -15,7 +15,7 @@ use thiserror::Error;
 /// A device that was found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found<D> {
-    /// The device's identifier in CubeCL and burn.
+    /// The device's identifier in CubeCL.
     pub device: D,
     /// The device's name in its driver.
     pub name: String,

@@ -3,9 +3,9 @@
 //!
 //! # Invariant
 //! A zone without depth differs from a near zone: its depth and its validity are both 0
-//! (`tests::a_zone_covers_its_pixels_and_a_blind_one_is_marked`). Training builds the network's
-//! input with the same functions
-//! (`train::examples::tests::training_and_inference_build_the_same_input`).
+//! (`tests::a_zone_covers_its_pixels_and_a_blind_one_is_marked`). Training gives the network the
+//! same input (`test_the_program_gives_fsrcnn_the_depth_that_training_gives_it` of the
+//! Python package).
 
 use std::iter::repeat_n;
 

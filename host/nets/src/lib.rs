@@ -30,8 +30,6 @@ mod gpu;
 pub mod images;
 pub mod interval;
 pub mod metrics;
-#[cfg(feature = "train")]
-pub mod model;
 mod network;
 pub mod prior;
 mod random;
@@ -39,8 +37,6 @@ pub mod reading;
 mod schema;
 mod separable;
 mod spread;
-#[cfg(feature = "train")]
-pub mod train;
 pub mod upscale;
 pub mod weights;
 pub mod zones;

@@ -182,22 +182,6 @@ pub(crate) fn classifier(weights: &Weights) -> Result<Vec<usize>, WeightsError> 
     schema.check(weights, 3)
 }
 
-/// Widths of the GAN's discriminator: channels after each convolution except the last.
-///
-/// # Errors
-/// As [`estimator`].
-#[cfg(any(feature = "train", test))]
-pub(crate) fn discriminator(weights: &Weights) -> Result<Vec<usize>, WeightsError> {
-    let mut schema = Schema::default();
-    let mut inputs = Axis::Fixed(2);
-    for layer in 0..3 {
-        schema.convolution(&format!("conv{}", layer + 1), width(layer), inputs, 4);
-        inputs = width(layer);
-    }
-    schema.convolution("conv4", Axis::Fixed(1), inputs, 3);
-    schema.check(weights, 3)
-}
-
 /// Features, shrunk channels and mapping layers of FSRCNN.
 ///
 /// # Errors

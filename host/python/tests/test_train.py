@@ -17,11 +17,13 @@ from nirspi.train import __main__ as command
 
 torch = pytest.importorskip("torch", reason="skipped: no torch (pip install torch)")
 
+from safetensors import safe_open  # noqa: E402
+
 from nirspi.train import data, folder, networks  # noqa: E402
 from nirspi.train.optics import conditions  # noqa: E402
 from nirspi.train.run import Run, Settings  # noqa: E402
 from nirspi.train.scenes import Scenes  # noqa: E402
-from nirspi.train.tasks import TASKS  # noqa: E402
+from nirspi.train.tasks import DISCRIMINATOR_RATE, TASKS  # noqa: E402
 
 DEBLURRERS = [name for name, task in TASKS.items() if task.enlarges]
 WIDTHS = {"fsrcnn": (8, 4), "estimator": (4, 6, 8, 8), "classifier": (6, 8, 12)} | dict.fromkeys(
@@ -128,6 +130,59 @@ def test_a_classifier_learns_classes_and_refuses_scenes_without(tmp_path):
         Memory().train(tiny("classifier"))
 
 
+def test_the_classifier_learns_from_characters_and_not_from_the_cameras_pictures(tmp_path, monkeypatch):
+    stacks = data.read([letters(tmp_path / "a.npz")])
+    read = data.pairs([pairs(tmp_path / "p.npz", [-1] * 3, [-1] * 3)], [], [])
+    masks, known = data.split(stacks, 0.2, 1), {image.tobytes() for image in read["x"]}
+    scenes = Scenes(stacks, masks, read, shapes=0.9, camera_share=1.0)
+    # The others do learn from the camera's pictures.
+    assert all(image.numpy().tobytes() in known for image in scenes.readings(4).x[:, 0])
+    monkeypatch.delattr(Scenes, "readings")
+    task = TASKS["classifier"](scenes, (4, 4, 4))
+    assert 3 < float(task.losses(32)["net"].detach()) < 6
+
+
+def gan(widths=(8, 8)):
+    torch.manual_seed(5)
+    task = TASKS["gan"](Scenes([], []), widths, networks.FSRCNN(8, 4).requires_grad_(False))
+    task.parts(1e-3)
+    return task
+
+
+def test_the_gans_losses_are_the_error_and_least_squares_of_what_the_judge_says():
+    task, seen = gan(), []
+
+    def judge(degraded, image):
+        seen.append(float(degraded.mean()))
+        return 2 * image[:, :, ::8, ::8]
+
+    task.judge = judge
+    x, y = torch.full((2, 1, 64, 64), 0.25), torch.full((2, 1, 64, 64), 0.5)
+    out = torch.full_like(x, 0.75, requires_grad=True)
+    losses = task.learned(x, y, out)
+    # It says 0.5 of the scene, which should be 1, and 1.5 of the generator's image, which should be 0.
+    assert float(losses["judge"]) == pytest.approx(0.5**2 + 1.5**2)
+    # The image is off by 0.5, and the judge should say 1 of it.
+    assert float(losses["net"].detach()) == pytest.approx(10 * 0.5 + 0.1 * 0.5**2)
+    assert set(seen) == {0.5}
+    # The judge's own loss moves the judge alone.
+    assert not losses["judge"].requires_grad and losses["net"].requires_grad
+
+
+def test_the_gans_judge_learns_to_tell_scenes_from_what_the_generator_makes():
+    task = gan()
+    optimizer = torch.optim.AdamW(task.judge.parameters(), DISCRIMINATOR_RATE)
+    told = []
+    for _ in range(60):
+        loss = task.losses(8)["judge"]
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        told.append(float(loss.detach()))
+    # One that says the same of all images has 0.5 at best.
+    assert np.mean(told[:5]) > 0.5 > np.mean(told[-10:]) + 0.1, told
+
+
 @pytest.mark.parametrize("network", ["diffusion", "gan"])
 def test_a_run_that_was_stopped_goes_on_to_the_very_same_weights(network):
     settings = tiny(network, steps=24, judge_every=10, log_every=4)
@@ -183,45 +238,13 @@ def test_training_ends_when_held_out_examples_get_no_better():
         ({"batch": 0}, "batch is 0, expected at least 1"),
         ({"rate": float("nan")}, "rate is nan, expected more than 0 and less than 1"),
         ({"held_out": 1.0}, "held_out is 1, expected more than 0 and less than 1"),
+        ({"camera_share": 1.5}, "camera_share is 1.5, expected 0 to 1"),
         ({"width": (1, 2, 3)}, r"width is \[1, 2, 3\], expected 2 numbers"),
     ],
 )
 def test_settings_that_cannot_be_are_named(wrong, line):
     with pytest.raises(ns.Error, match=line):
         Memory().train(Settings(**vars(tiny("fsrcnn")) | wrong))
-
-
-@pytest.mark.parametrize("network", list(TASKS))
-def test_networks_are_trained_at_the_size_of_the_shipped_ones(network):
-    shipped = ROOT / "host/nets/weights"
-    place = (
-        shipped if network in ("fsrcnn", "diffusion", "estimator", "classifier") else shipped / "baselines"
-    )
-    state = folder.tensors(place / f"{network}.safetensors")
-    net = TASKS[network].network(None, TASKS[network].widths)
-    assert {name: tensor.shape for name, tensor in net.state_dict().items()} == {
-        name: t.shape for name, t in state.items()
-    }
-    net.load_state_dict(state)
-
-
-@pytest.mark.parametrize(
-    ("name", "net"),
-    [
-        ("unet", lambda: networks.UNet((8, 12, 16), 2, 8)),
-        ("fsrcnn", lambda: networks.FSRCNN(8, 5, 3)),
-        ("estimator", lambda: networks.Estimator((4, 6, 8, 10), hidden=7)),
-        ("classifier", lambda: networks.Classifier((4, 6, 8))),
-    ],
-)
-def test_networks_give_the_numbers_that_the_program_is_tested_with(name, net):
-    at = ROOT / "host/nets/tests/pytorch"
-    net, pairs = net(), folder.tensors(at / f"{name}_reference.safetensors")
-    net.load_state_dict(folder.tensors(at / f"{name}.safetensors"))
-    inputs = [pairs[key] for key in sorted(pairs) if key.startswith("in")]
-    with torch.no_grad():
-        found = net(*inputs)
-    assert (found - pairs[max(key for key in pairs if key.startswith("out"))]).abs().max() < 1e-5
 
 
 def run(tmp_path, *more, network="fsrcnn", width="4,2"):
@@ -276,8 +299,44 @@ def test_a_checkpoint_with_a_wrong_bit_is_refused(tmp_path, capsys):
         path.write_bytes(bad)
         assert run(tmp_path, "--steps", 8, "--resume") == 1
         assert "damaged or cut short" in capsys.readouterr().err
+    kept = folder.Folder(tmp_path / "run")
+    for at in range(0, len(good), 997):
+        for bad in (good[:at], good[:at] + bytes([good[at] ^ 16]) + good[at + 1 :]):
+            path.write_bytes(bad)
+            with pytest.raises(ns.Error, match="damaged or cut short"):
+                kept.load("cpu")
     path.write_bytes(good)
     assert run(tmp_path, "--steps", 8, "--resume") == 0
+
+
+def test_a_file_that_cannot_be_written_is_the_one_before(tmp_path, monkeypatch):
+    path = tmp_path / "weights.safetensors"
+    folder.whole(path, b"before")
+    for call in ("fsync", "replace"):
+        with monkeypatch.context() as full:
+
+            def refuse(*_):
+                raise OSError(28, "No space left on device")
+
+            full.setattr(os, call, refuse)
+            with pytest.raises(ns.Error, match="weights.safetensors: cannot write it: No space left"):
+                folder.whole(path, b"after")
+        assert path.read_bytes() == b"before"
+    folder.whole(path, b"after")
+    assert path.read_bytes() == b"after"
+
+
+@pytest.mark.parametrize("network", ["estimator", "ancestral"])
+def test_kept_weights_say_what_they_are_and_how_they_were_made(network, tmp_path):
+    shipped = ROOT / "host/nets/weights/fsrcnn.safetensors"
+    width = ",".join(map(str, WIDTHS[network]))
+    assert run(tmp_path, "--steps", 4, "--fsrcnn", shipped, network=network, width=width) == 0
+    with safe_open(tmp_path / "run/weights.safetensors", "pt") as file:
+        about = file.metadata()
+    recipe = f"nirspi.train {network}: 4 of 4 steps of 2, rate "
+    assert about["model"] == network and about["recipe"].startswith(recipe)
+    path = {"steps": "500", "beta_start": "0.0002", "beta_end": "0.025"}
+    assert {key: about.get(key) for key in path} == (path if network == "ancestral" else dict.fromkeys(path))
 
 
 def test_data_and_pairs_are_trained_on_and_told_and_other_data_are_another_run(tmp_path, capsys):
@@ -288,6 +347,18 @@ def test_data_and_pairs_are_trained_on_and_told_and_other_data_are_another_run(t
     assert stack["name"] == "a" and stack["held_out_images"] == 4 and len(stack["held_out"]) == 1
     other = letters(tmp_path / "b.npz", seed=9)
     assert run(tmp_path, "--data", other, "--camera-share", 1, "--steps", 8, "--resume") == 1
+    assert "checkpoint: another data" in capsys.readouterr().err
+    others = pairs(tmp_path / "others.npz", [0] * 11, np.arange(11) % 6)
+    assert run(tmp_path, "--data", a, "--pairs", others, "--camera-share", 1, "--steps", 8, "--resume") == 1
+    assert "checkpoint: another data" in capsys.readouterr().err
+
+
+def test_another_fsrcnn_is_another_run(tmp_path, capsys):
+    at = ROOT / "host/nets"
+    more = {"network": "regression", "width": "4"}
+    assert run(tmp_path, "--steps", 2, "--fsrcnn", at / "weights/fsrcnn.safetensors", **more) == 0
+    other = at / "tests/pytorch/fsrcnn.safetensors"
+    assert run(tmp_path, "--steps", 4, "--fsrcnn", other, "--resume", **more) == 1
     assert "checkpoint: another data" in capsys.readouterr().err
 
 
@@ -332,12 +403,16 @@ def test_the_rate_rises_then_falls():
 def test_a_zone_of_a_pair_without_depth_is_zero_and_marked(tmp_path):
     read = data.pairs([pairs(tmp_path / "p.npz", [-1], [-1])], [], [])
     read["depth_m"][0] = 1.5
-    read["depth_m"][0, 2, 3] = 0
+    read["depth_m"][0, 2, 3], read["depth_m"][0, 7, 7] = 0, 4.5
     metres, valid = Scenes([], [], read, camera_share=1.0).readings(1).depth[0]
     lost = torch.zeros(32, 32, dtype=torch.bool)
     lost[8:12, 12:16] = True
     assert torch.equal(valid == 0, lost) and torch.equal(metres == 0, lost)
-    assert set(metres[~lost].tolist()) == {0.5} and set(valid[~lost].tolist()) == {1.0}
+    # The network is given at most 3 m.
+    assert set(metres[28:, 28:].flatten().tolist()) == {1.0}
+    lost_or_far = lost.clone()
+    lost_or_far[28:, 28:] = True
+    assert set(metres[~lost_or_far].tolist()) == {0.5} and set(valid[~lost].tolist()) == {1.0}
 
 
 def test_raw_is_the_reading_four_times_or_the_image_itself():
@@ -376,22 +451,57 @@ def test_what_cannot_be_trained_is_named_and_leaves_nothing(tmp_path, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_control_c_keeps_the_run_which_then_goes_on(tmp_path, monkeypatch):
-    once = Run.once
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_that_ends_a_run_keeps_it_and_it_goes_on(name, tmp_path, monkeypatch):
+    number = getattr(signal, name)
+    once, before = Run.once, signal.getsignal(number)
 
     def interrupted(self):
         if self.step == 5:
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
         return once(self)
 
     monkeypatch.setattr(Run, "once", interrupted)
-    assert run(tmp_path, "--steps", 12) == 0
+    # Ctrl-C is the user's wish; the others are not.
+    assert run(tmp_path, "--steps", 12) == (0 if number == signal.SIGINT else 1)
     state = folder.Folder(tmp_path / "run").load("cpu")
     assert 6 <= state["step"] < 12
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(number) is before
     monkeypatch.undo()
     assert run(tmp_path, "--steps", 12, "--resume") == 0
     assert steps(tmp_path) == [4, 8, 12]
+
+
+def test_a_signal_that_is_ignored_stays_ignored(tmp_path, monkeypatch):
+    once = Run.once
+
+    def interrupted(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return once(self)
+
+    monkeypatch.setattr(Run, "once", interrupted)
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        assert run(tmp_path, "--steps", 4) == 0
+        assert signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert steps(tmp_path) == [4]
+
+
+def test_pairs_and_characters_that_the_program_makes_are_trained_on(tmp_path, cli):
+    letters(tmp_path / "own.npz", groups=10)
+    options = ["--held-out", "0.1", "--count", "6", "--characters", "letters", "--out", "pairs.npz"]
+    command_line = [cli, "pairs", "--data", "own.npz", *options]
+    subprocess.run(command_line, cwd=tmp_path, check=True, capture_output=True)
+    (written,), (given,) = data.read([tmp_path / "letters"]), data.read([tmp_path / "own.npz"])
+    assert (written.images == given.images).all() and (written.groups == given.groups).all()
+    assert (written.labels == given.labels).all()
+    made = tmp_path / "pairs.npz"
+    with np.load(made) as file:
+        assert file["x"].shape == (6, 64, 64) and file["y"].shape == (6, 32, 32)
+    trained = ["--data", tmp_path / "letters", "--pairs", made, "--camera-share", 1, "--steps", 4]
+    assert run(tmp_path, *trained) == 0
 
 
 def test_the_program_computes_with_the_weights_of_a_run_what_pytorch_does(tmp_path, cli):

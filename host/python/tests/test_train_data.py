@@ -19,7 +19,7 @@ def letters(path, groups=6, each=4, seed=3, **changed):
 
 
 def pairs(path, stack, group):
-    """Pairs as `nirspi train degrade` writes them, of these stacks and groups."""
+    """Pairs as `nirspi pairs` writes them, of these stacks and groups."""
     count, random = len(stack), np.random.default_rng(5)
     image = {
         name: random.random((count, n, n), np.float32)
@@ -49,6 +49,15 @@ def test_no_image_of_training_is_one_that_is_held_out_not_even_in_another_stack(
         assert all(0 < mask.sum() < len(mask) for mask in masks)
         for stack, mask in zip([one, other], masks, strict=True):
             assert not set(stack.groups[mask]) & set(stack.groups[~mask])
+
+
+def test_a_blank_image_connects_nothing(tmp_path):
+    blank = data.read([letters(tmp_path / "a.npz")])[0]
+    # The first image of each group shows nothing; two groups share a character.
+    blank.images[::4] = 0
+    blank.images[9] = blank.images[13]
+    of = data.families([blank])
+    assert len(set(of.values())) == 5 and of[(0, 2)] == of[(0, 3)]
 
 
 def test_the_split_follows_from_the_seed_and_the_stack(tmp_path):

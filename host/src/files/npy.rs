@@ -257,6 +257,7 @@ macro_rules! element {
 element!(f32, "<f4");
 element!(f64, "<f8");
 element!(i64, "<i8");
+element!(u8, "|u1");
 
 /// The bytes of a `.npy` file (format 1.0, little-endian, C order) for an array of this shape.
 ///

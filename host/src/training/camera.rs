@@ -12,7 +12,7 @@ use crate::calibration::{CalibrationError, Settling, calibrate};
 use crate::session::{IgnorePackets, Session, SessionError};
 use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use nirspi_nets::data::SIDE_PX;
-use nirspi_nets::degrade::{Degrade, DegradeError, Depth, Reading, defocus};
+use nirspi_nets::degrade::{Depth, Reading, defocus};
 use nirspi_optics::rain::{Drops, PaperRain, RainError, Rainfall, Weather};
 use nirspi_optics::water::Water;
 use nirspi_optics::{CameraModel, LEDS, Scene, SceneError};
@@ -323,17 +323,6 @@ struct Taken {
     /// Mean reflectance that each LED illuminated.
     seen: Vec<f32>,
     measured: Measurements,
-}
-
-impl Degrade for LinearCamera {
-    fn degrade(&self, scene: &[f32], rng: &mut Pcg64Mcg) -> Result<Reading, DegradeError> {
-        let refused = |error: TrainingCameraError| DegradeError::Camera(error.to_string());
-        if scene.len() != SIDE_PX * SIDE_PX {
-            return Err(DegradeError::Shape { found: scene.len() });
-        }
-        let conditions = self.conditions(rng).map_err(refused)?;
-        Ok(self.picture(scene, conditions, rng).map_err(refused)?.reading)
-    }
 }
 
 /// ADC counts that one LED on a white target adds to a sample. The time-of-flight sensor gives the

@@ -8,29 +8,9 @@
 //! (`camera::tests::a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone`).
 
 mod camera;
+pub mod characters;
 pub mod fonts;
 pub mod pairs;
 
 pub use camera::{CameraMeasurement, CameraPicture, Conditions, LinearCamera, TrainingCameraError};
 pub use nirspi_optics::rain::Rainfall;
-
-use nirspi_nets::degrade::{AnalyticCamera, Degrade, DegradeError, Reading};
-use rand::RngExt;
-use rand_pcg::Pcg64Mcg;
-
-/// A mixture of pictures by the virtual camera and by formulas.
-pub struct Mixed {
-    /// The formulas.
-    pub analytic: AnalyticCamera,
-    /// The camera, and the share of pictures that it takes.
-    pub camera: Option<(LinearCamera, f32)>,
-}
-
-impl Degrade for Mixed {
-    fn degrade(&self, scene: &[f32], rng: &mut Pcg64Mcg) -> Result<Reading, DegradeError> {
-        match &self.camera {
-            Some((camera, share)) if rng.random::<f32>() < *share => camera.degrade(scene, rng),
-            _ => self.analytic.degrade(scene, rng),
-        }
-    }
-}

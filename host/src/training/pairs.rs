@@ -1,5 +1,5 @@
-//! Pairs of sharp scenes and pictures of the virtual camera, as a file for training with other
-//! programs.
+//! Pairs of sharp scenes and pictures of the virtual camera, as a file for training:
+//! `python -m nirspi.train` reads it, and so can other programs.
 //!
 //! # Invariant
 //! Pair k depends on the seed and k only, so a longer file begins with the shorter one

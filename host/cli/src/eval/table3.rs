@@ -6,7 +6,6 @@ use crate::print;
 use crate::progress::Progress;
 use anyhow::Result;
 use nirspi_eval::table3::{Report, Row, Settings, Table};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Image quality in rain beside the paper's Table 3: NIR-SPI, VIS and the networks
@@ -26,9 +25,6 @@ pub struct Args {
     exposure: ExposureArgs,
     #[command(flatten)]
     ancestral: AncestralArgs,
-    /// Weights of Inception-v3 in safetensors with torchvision's names, for FID, which takes about a second for each picture
-    #[arg(long, value_name = "FILE")]
-    inception: Option<PathBuf>,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -40,7 +36,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         exposure: args.exposure.exposure(&camera)?,
         camera,
         ancestral_steps: args.ancestral.steps,
-        inception: args.inception.clone(),
     };
     let bar = Progress::of("table 3", settings.pictures(), "pictures");
     let table = Table::take(settings, &|| bar.add(1))?;
@@ -97,10 +92,5 @@ fn at(distance_m: Option<f64>) -> String {
 }
 
 fn fid(row: &Row) -> String {
-    match (row.fid, row.paper_fid) {
-        (Some(ours), Some(paper)) => format!("; FID {ours:.1}, paper {paper}"),
-        (Some(ours), None) => format!("; FID {ours:.1}"),
-        (None, Some(paper)) => format!(", FID {paper}"),
-        (None, None) => String::new(),
-    }
+    row.paper_fid.map_or_else(String::new, |paper| format!(", FID {paper}"))
 }

@@ -136,11 +136,11 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["deblur", "in.npy", "--model", "gan", "--steps", "3", "--out", "o.npy"], &["--steps"]),
         (&["deblur", "in.npy", "--blur-px", "-1", "--out", "o.npy"], &["--blur-px is -1"]),
         (&["enhance", "in.npy", "--noise", "nan", "--out", "o.npy"], &["--noise is NaN"]),
-        (&["enhance", "in.npy", "--backend", "tpu", "--out", "o.npy"], &["tpu", "wgpu or cuda"]),
         (
-            &["train", "fsrcnn", "--backend", "tpu", "--out", "run"],
+            &["enhance", "in.npy", "--backend", "tpu", "--out", "o.npy"],
             &["--backend", "tpu", "auto, cpu, wgpu or cuda"],
         ),
+        (&["pairs", "--characters", "letters", "--out", "p.npz"], &["--data", "--fonts"]),
         (&["virtual", "--distance-m", "0"], &["--distance-m is 0"]),
     ];
     for (arguments, words) in mistakes {

@@ -24,6 +24,7 @@ mod many;
 mod metrics;
 mod other_forms;
 mod packaging;
+mod pairs;
 #[cfg(unix)]
 mod preview;
 mod provenance;
@@ -34,7 +35,7 @@ mod readme;
 mod real_data;
 mod reconstruct;
 // The page is of a build with the default features.
-#[cfg(all(feature = "gpu", feature = "hdf5", not(feature = "flash"), not(feature = "train")))]
+#[cfg(all(feature = "gpu", feature = "hdf5", not(feature = "flash")))]
 mod reference;
 mod selftest;
 #[cfg(unix)]
@@ -44,7 +45,6 @@ mod serve_controls;
 mod serve_guarded;
 mod settings;
 mod sparse_problems;
-mod train;
 mod update;
 mod versions;
 mod weights;

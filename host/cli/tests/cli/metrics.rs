@@ -51,7 +51,7 @@ fn sets_of_characters_have_a_distance_of_their_own_name() {
     let distance =
         |report: &serde_json::Value| report["frechet_character_distance"].as_f64().unwrap();
     assert!(distance(&near) < 1e-3 && distance(&far) > distance(&near), "{near} {far}");
-    assert!(far["fid"].is_null() && near["character_accuracy"].is_null(), "{far}");
+    assert!(near["character_accuracy"].is_null(), "{far}");
     assert!(far["character_accuracy"]["test"].as_f64().unwrap() <= 1.0, "{far}");
 }
 
@@ -70,22 +70,7 @@ fn a_figure_that_cannot_be_had_says_why() {
     with(&["--labels", "labels.npy"]).failed(1, &["labels.npy", "2 labels, expected 3"]);
     with(&["--labels", "odd.npy"]).failed(1, &["odd.npy", "11.5 at [1]", "0 to 61"]);
     with(&["--labels", "flat.npy"]).failed(1, &["flat.npy", "(3, 1)", "(N,)"]);
-    with(&["--inception", "labels.npy"]).failed(1, &["labels.npy", "safetensors"]);
     with(&["--legibility"]).failed(2, &["--labels"]);
-}
-
-#[test]
-#[cfg(not(feature = "train"))]
-fn a_build_without_inception_says_which_build_has_it() {
-    let bench = Bench::new();
-    bench.write("one.npy", &stripes(0));
-    let classifier = nirspi_nets::Weights::embedded("classifier").unwrap();
-    let classifier = classifier.to_bytes(nirspi_nets::weights::Precision::Half).unwrap();
-    bench.write("inception.safetensors", &classifier);
-    let line = "this build has no FID; build it with: cargo build --release --features train";
-    bench
-        .run(&["metrics", "one.npy", "one.npy", "--inception", "inception.safetensors"])
-        .failed(1, &[line]);
 }
 
 #[test]

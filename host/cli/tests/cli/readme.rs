@@ -26,7 +26,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("", "virtual --", "runs until it is stopped; tests/cli/capture_tcp.rs and tests/tests/qemu"),
     ("", "--camera usb", "needs a camera on USB"),
     ("", "--camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
-    ("", "nirspi train", "needs the feature train; .ci/run training"),
+    ("", "nirspi pairs", "the user's characters; tests/cli/pairs.rs"),
     ("", "python -m nirspi.train", "needs PyTorch; .ci/run python-peers"),
     ("boards/electronics/README.md", "run.sh", "needs ngspice; .ci/run electronics"),
     ("boards/mps2-an505/README.md", "install-qemu.sh", "fetches from Debian; .ci/run emulation"),
@@ -49,6 +49,11 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/reliability.md", "serve_soak.py", "ten minutes; .ci/run crowd"),
     ("docs/measurements.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
     ("docs/measurements.md", "benches/", "the user's archive; tests/cli/many.rs"),
+    (
+        "docs/training.md",
+        "nirspi deblur in.npy",
+        "the weights of a training; host/python/tests/test_train.py",
+    ),
     ("docs/training.md", "python ", "needs torch and data of other groups"),
     (
         "docs/training.md",

@@ -39,8 +39,6 @@ pub struct Row {
     /// Fréchet distance at 64 x 64 on the features of nirspi's classifier, which is not FID. The
     /// distance grows with fewer scenes.
     pub frechet_character_distance: Interval,
-    /// FID with the user's Inception weights.
-    pub fid: Option<f64>,
     /// The paper's PSNR.
     pub paper_psnr_db: f64,
     /// The paper's SSIM.
@@ -150,10 +148,6 @@ impl Statistics<'_> {
         let draws = self.redraws.first(DISTANCE_DRAWS);
         let draws: Vec<&Vec<usize>> = draws.iter().filter(|draw| places(draw).len() > 1).collect();
         let drawn = draws.par_iter().map(|draw| of(draw)).collect::<Result<Vec<f64>>>()?;
-        let (sharp, made): (Vec<&[f32]>, Vec<&[f32]>) = places(&scenes)
-            .iter()
-            .map(|&k| (self.taken[k].wet.truth_fine.as_slice(), wet[k].fine.as_slice()))
-            .unzip();
         Ok(Row {
             image: *image,
             distance_m: distance.map(|at| DISTANCES_M[at]),
@@ -163,7 +157,6 @@ impl Statistics<'_> {
             dry_ssim: self.mean(distance, |k| dry[k].quality.ssim),
             blank_psnr_db: self.mean(distance, |k| self.taken[k].blank.psnr_db),
             frechet_character_distance: Redraws::around(of(&scenes)?, drawn),
-            fid: self.sets.fid(&sharp, &made)?,
             paper_psnr_db: paper.psnr_db,
             paper_ssim: paper.ssim,
             paper_fid: paper.fid,

@@ -1,8 +1,6 @@
-//! The networks' forward passes on the CPU, for a few images and without training.
+//! The networks' forward passes on the CPU, for a few images.
 //!
-//! Tests compare each network with PyTorch's outputs for the same weights. The networks for
-//! training (`crate::model`, feature `train`) read the same files and are compared with the same
-//! outputs.
+//! Tests compare each network with PyTorch's outputs for the same weights.
 //!
 //! # Invariant
 //! A result depends neither on the number of threads nor on the other images of a batch

@@ -1,10 +1,9 @@
 //! Training data: labelled characters, split by who drew them, and scenes without letters.
 //!
 //! # Invariant
-//! An example depends only on the seed and its number
-//! (`train::examples::tests::examples_are_the_same_in_whatever_batches_they_come`). No random state
-//! is kept, so a stopped run continues with the examples that it would have used. Training never
-//! draws from a held-out group
+//! A scene depends only on its generator, and a generator on seed, purpose and number
+//! (`stream::tests::seed_purpose_and_number_each_make_another_stream`). Scenes for training never
+//! come from a held-out group
 //! (`scenes::tests::training_draws_from_no_held_out_image_and_the_other_way_round`).
 //!
 //! | module | contents |

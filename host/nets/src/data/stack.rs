@@ -72,12 +72,6 @@ pub enum DataError {
         /// The accepted range.
         expected: &'static str,
     },
-    /// The stack has no classes, which this network needs.
-    #[error("{name}: images without labels, expected a class for each")]
-    Unlabelled {
-        /// The stack.
-        name: String,
-    },
 }
 
 impl Stack {

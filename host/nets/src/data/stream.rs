@@ -12,15 +12,11 @@ pub enum Purpose {
     Training,
     /// Held-out examples.
     HeldOut,
-    /// Random numbers that a training step adds to its batch: times on the path, noise.
-    Step,
-    /// The initial weights of a network.
-    Weights,
-    /// Pairs for training elsewhere.
+    /// Pairs for training.
     Pairs,
 }
 
-/// The stream of random numbers for example or step `index` of a run with this seed.
+/// The stream of random numbers for example `index` of this seed.
 #[must_use]
 pub fn stream(seed: u64, purpose: Purpose, index: u64) -> Pcg64Mcg {
     let mixed =

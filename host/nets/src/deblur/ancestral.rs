@@ -12,16 +12,11 @@ use crate::network::RunUNet;
 use crate::random::Noise;
 use crate::weights::{Weights, WeightsError};
 
-/// The schedule of the shipped weights: number of steps, first beta and last beta, as in
-/// `host/nets/training/train_unet.py`.
+/// The schedule: the share of the image left after each of the T steps of noise.
 ///
 /// Twice the betas of Ho, Jain and Abbeel (NeurIPS 2020: 1e-4 to 0.02 in 1000 steps) would end at
 /// 0.04, with abar at 4e-5. The shipped weights were trained with betas up to 0.025, where abar
 /// ends at 0.0017.
-#[cfg(any(feature = "train", test))]
-const SHIPPED: (usize, [f64; 2]) = (500, [2e-4, 0.025]);
-
-/// The schedule: the share of the image left after each of the T steps of noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
     /// abar_t, the products of 1 - beta.
@@ -29,28 +24,6 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// The schedule of the shipped weights, which training uses too.
-    #[cfg(any(feature = "train", test))]
-    pub(crate) fn shipped() -> Self {
-        let (steps, [start, end]) = SHIPPED;
-        Self::linear(steps, start, end)
-    }
-
-    /// Writes into the weights' metadata that they were trained with [`shipped`](Self::shipped).
-    #[cfg(any(feature = "train", test))]
-    pub(crate) fn describe_shipped(weights: &mut Weights) {
-        let (steps, [start, end]) = SHIPPED;
-        weights.set_metadata("steps", steps.to_string());
-        weights.set_metadata("beta_start", start.to_string());
-        weights.set_metadata("beta_end", end.to_string());
-    }
-
-    /// Number of steps of noise.
-    #[cfg(feature = "train")]
-    pub(crate) fn steps(&self) -> usize {
-        self.left.len()
-    }
-
     /// The schedule that the weights were trained with: metadata `steps`, `beta_start`, `beta_end`.
     ///
     /// # Errors
@@ -74,12 +47,6 @@ impl Schedule {
             Some(*product)
         });
         Self { left: left.collect() }
-    }
-
-    /// abar after step `step`; the first step is 0.
-    #[cfg(feature = "train")]
-    pub(crate) fn left(&self, step: usize) -> f64 {
-        self.left[step]
     }
 
     /// abar at `count` of the steps, evenly spaced, the noisiest first.
@@ -180,18 +147,20 @@ mod tests {
     }
 
     #[test]
-    fn the_shipped_schedule_is_that_of_the_embedded_weights_and_of_their_trainer() {
+    fn the_embedded_weights_have_the_schedule_of_both_trainers() {
         let weights = Weights::embedded("ancestral").unwrap();
-        assert_eq!(Schedule::of(&weights).unwrap(), Schedule::shipped());
-        let (steps, [start, end]) = SHIPPED;
-        let trainer = include_str!("../../training/train_unet.py");
-        let line = trainer.lines().find(|line| line.starts_with("STEPS, BETA_START, BETA_END"));
-        let (_, values) = line.unwrap().split_once('=').unwrap();
-        let values: Vec<f64> = values.split(',').map(|v| v.trim().parse().unwrap()).collect();
-        assert_eq!(values, [steps as f64, start, end]);
-        let mut described = Weights::new("described");
-        Schedule::describe_shipped(&mut described);
-        assert_eq!(Schedule::of(&described).unwrap(), Schedule::shipped());
+        let trainers = [
+            include_str!("../../training/train_unet.py"),
+            include_str!("../../../python/python/nirspi/train/tasks.py"),
+        ];
+        for trainer in trainers {
+            let line = trainer.lines().find(|line| line.starts_with("STEPS, BETA_START, BETA_END"));
+            let (_, values) = line.unwrap().split_once('=').unwrap();
+            let values: Vec<f64> = values.split(',').map(|v| v.trim().parse().unwrap()).collect();
+            let [steps, start, end] = values[..] else { panic!("{values:?}") };
+            let trained = Schedule::linear(steps as usize, start, end);
+            assert_eq!(Schedule::of(&weights).unwrap(), trained);
+        }
     }
 
     #[test]

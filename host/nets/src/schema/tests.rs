@@ -22,30 +22,14 @@ macro_rules! network {
 
 /// The networks, and what takes weights for each: the forward passes themselves where there are
 /// some.
-fn networks() -> [(Weights, Check); 6] {
+fn networks() -> [(Weights, Check); 5] {
     [
         network!("unet", crate::cpu::UNet::new),
         network!("fsrcnn", crate::cpu::Fsrcnn::new),
         network!("estimator", crate::cpu::Estimator::new),
         network!("classifier", crate::cpu::Classifier::new),
-        network!("discriminator", discriminator),
         network!("prior", crate::cpu::Prior::new),
     ]
-}
-
-/// What training takes for the sizes of the network of that number.
-#[cfg(feature = "train")]
-fn trained(network: usize, weights: &Weights) -> Result<(), WeightsError> {
-    use crate::model::*;
-    match network {
-        0 => UNetConfig::of(weights).map(drop),
-        1 => FsrcnnConfig::of(weights).map(drop),
-        2 => EstimatorConfig::of(weights).map(drop),
-        3 => ClassifierConfig::of(weights).map(drop),
-        4 => DiscriminatorConfig::of(weights).map(drop),
-        // Trained in PyTorch alone.
-        _ => crate::cpu::Prior::new(weights).map(drop),
-    }
 }
 
 #[derive(Debug, Clone)]
@@ -125,11 +109,6 @@ proptest! {
         let found = altered.get(name).ok();
         // A rename to nothing, or a row of one number that was a row of one number.
         let same = found.is_some_and(|found| found == sound);
-        #[cfg(feature = "train")]
-        {
-            let said = |result: Result<(), WeightsError>| result.map_err(|error| error.to_string());
-            prop_assert_eq!(said(trained(network, &altered)), said(check(&altered)));
-        }
         match (check(&altered), same) {
             (Ok(()), true) => {}
             (Err(error), false) => {
@@ -167,7 +146,6 @@ fn sound_weights_have_the_sizes_that_pytorch_made_them_with() {
     assert_eq!(fsrcnn(&of("fsrcnn")).unwrap(), [8, 5, 3]);
     assert_eq!(estimator(&of("estimator")).unwrap(), [4, 6, 8, 10, 7]);
     assert_eq!(classifier(&of("classifier")).unwrap(), [4, 6, 8]);
-    assert_eq!(discriminator(&of("discriminator")).unwrap(), [4, 5, 6]);
     let sizes = PriorSizes { stages: 2, blocks: 2, widths: [6, 5] };
     assert_eq!(prior(&of("prior")).unwrap(), sizes);
 }

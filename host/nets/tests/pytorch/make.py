@@ -54,12 +54,6 @@ for i, (a, b, stride) in enumerate([(1, 4, 2), (4, 4, 1), (4, 6, 2), (6, 6, 1), 
 classifier.fc = nn.Linear(8, 62)
 write("classifier", "classifier", classifier, [x], lambda m: [m.features(x), m(x)])
 
-discriminator = net.Discriminator()
-for i, (a, b) in enumerate([(2, 4), (4, 5), (5, 6)], 1):
-    setattr(discriminator, f"conv{i}", nn.Conv2d(a, b, 4, 2, 1))
-discriminator.conv4 = nn.Conv2d(6, 1, 3, 1, 1)
-write("discriminator", "discriminator", discriminator, [y, x], lambda m: [m(y, x)])
-
 
 def measured(n, share, noise, skip_mean):
     """A scene's measurements by natural row, in the units of a camera (d = H x), and what the network is given and gives."""

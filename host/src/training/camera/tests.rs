@@ -61,6 +61,15 @@ fn a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone() {
     }
 }
 
+/// The scene averaged over squares of 2 x 2 pixels.
+fn sampled(scene: &[f32]) -> Vec<f32> {
+    let pair = |row: usize, column: usize| scene[row * SIDE_PX + column..][..2].iter().sum::<f32>();
+    (0..SIDE_PX * SIDE_PX / 4)
+        .map(|pixel| (2 * (pixel / (SIDE_PX / 2)), 2 * (pixel % (SIDE_PX / 2))))
+        .map(|(row, column)| (pair(row, column) + pair(row + 1, column)) / 4.0)
+        .collect()
+}
+
 #[test]
 fn light_that_is_enough_shows_the_scene_as_the_lens_does() {
     let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
@@ -68,12 +77,11 @@ fn light_that_is_enough_shows_the_scene_as_the_lens_does() {
     let conditions =
         Conditions { distance_mm: 400.0, rain: Rainfall::Heavy, sweeps: 100_000, sampling: 1.0 };
     let reading = camera.picture(&star(), conditions, &mut rng).unwrap().reading;
-    let (mean, deviation) =
-        mean_and_deviation(&reading.image, &nirspi_nets::degrade::sampled(&reading.optical));
+    let (mean, deviation) = mean_and_deviation(&reading.image, &sampled(&reading.optical));
     // Rain takes less than a percent. Emitters of 2/3 of the pitch see slightly different areas
     // than whole pixels.
     assert!(mean.abs() < 0.02 && deviation < 0.03, "{mean} {deviation}");
-    let (_, sharp) = mean_and_deviation(&reading.image, &nirspi_nets::degrade::sampled(&star()));
+    let (_, sharp) = mean_and_deviation(&reading.image, &sampled(&star()));
     assert!(sharp > 2.0 * deviation, "no blur: {sharp}");
 }
 
@@ -81,7 +89,11 @@ fn light_that_is_enough_shows_the_scene_as_the_lens_does() {
 fn pictures_are_of_their_seed_alone_and_in_range() {
     let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
     for index in 0..12 {
-        let taken = || camera.degrade(&star(), &mut stream(9, Purpose::Training, index)).unwrap();
+        let taken = || {
+            let mut rng = stream(9, Purpose::Training, index);
+            let conditions = camera.conditions(&mut rng).unwrap();
+            camera.picture(&star(), conditions, &mut rng).unwrap().reading
+        };
         let reading = taken();
         assert_eq!(reading, taken());
         assert!(reading.image.iter().all(|v| (0.0..=1.0).contains(v)));

@@ -53,7 +53,7 @@ def train(
     data : sequence of paths
         ``letters.npz``, or folders of such files. Without any, scenes are shapes.
     pairs : sequence of paths
-        Files of ``nirspi train degrade``, of the same data.
+        Files of ``nirspi pairs``, of the same data.
     fsrcnn : path, optional
         Weights that enlarge the readings, for the deblurring networks.
     resume : bool
@@ -108,7 +108,7 @@ def train(
     scenes = Scenes(
         stacks, masks, read, shapes=chosen.shapes, camera_share=chosen.camera_share, device=device
     )
-    run = Run(chosen, scenes, enlarger(weights, device) if weights else None)
+    run = Run(chosen, scenes, enlarger(fsrcnn, weights, device) if fsrcnn else None)
     folder = Folder(Path(out))
     if resume:
         run.resume(folder.load(device))

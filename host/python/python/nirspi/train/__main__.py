@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="FILE",
-        help="pairs of nirspi train degrade, of the same --data",
+        help="pairs of nirspi pairs, of the same --data",
     )
     add(
         "--fsrcnn",
@@ -113,14 +113,15 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
+# Signals that end a run in order. Windows has no SIGHUP.
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 # The options that are settings of a run.
 SETTINGS = tuple(field.name for field in fields(Settings) if field.name not in ("network", "average", "data"))
 
 
-def _train(arguments: argparse.Namespace) -> dict:
-    """Trains as the arguments say, until Ctrl-C. Returns the report."""
+def _train(arguments: argparse.Namespace, halt: list[int]) -> dict:
+    """Trains as the arguments say, until a signal, which is added to `halt`. Returns the report."""
     given = {name: getattr(arguments, name) for name in SETTINGS}
-    halt: list[bool] = []
 
     def told(entry):
         score = (
@@ -133,7 +134,9 @@ def _train(arguments: argparse.Namespace) -> dict:
             flush=True,
         )
 
-    before = signal.signal(signal.SIGINT, lambda *_: halt.append(True))
+    # What is ignored stays ignored: under nohup a run outlives its terminal.
+    heeded = [number for number in ENDING if signal.getsignal(number) != signal.SIG_IGN]
+    before = {number: signal.signal(number, lambda number, _: halt.append(number)) for number in heeded}
     try:
         return train(
             arguments.network,
@@ -148,13 +151,15 @@ def _train(arguments: argparse.Namespace) -> dict:
             **{name: value for name, value in given.items() if value is not None},
         )
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def main(argv: list[str] | None = None) -> int:
     arguments = parser().parse_args(argv)
+    halt: list[int] = []
     try:
-        report = _train(arguments)
+        report = _train(arguments, halt)
     except Error as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
@@ -168,7 +173,8 @@ def main(argv: list[str] | None = None) -> int:
         )
         go_on = "; the same command with --resume goes on" if report["ended"] == "stopped" else ""
         print(f"{report['ended']} at step {report['step']}{best}: {report['out']}{go_on}")
-    return 0
+    # Ctrl-C is the user's wish; the system's end of a run is a failure.
+    return 1 if report["ended"] == "stopped" and halt[0] != signal.SIGINT else 0
 
 
 if __name__ == "__main__":

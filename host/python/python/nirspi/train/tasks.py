@@ -240,12 +240,15 @@ TASKS: dict[str, type[Task]] = {
 }
 
 
-def enlarger(state, device) -> nn.Module:
-    """The FSRCNN of these weights, which enlarges readings and is not trained."""
+def enlarger(path, state, device) -> nn.Module:
+    """The FSRCNN of the weights in the file `path`, which enlarges readings and is not trained."""
     try:
-        features, shrunk = state["feature.weight"].shape[0], state["shrink.weight"].shape[0]
-        net = FSRCNN(features, shrunk)
-        net.load_state_dict({name: tensor.float() for name, tensor in state.items()})
-    except (KeyError, RuntimeError):
-        raise Error("other weights, expected those of fsrcnn") from None
+        maps = sum(name.startswith("map.") and name.endswith(".weight") for name in state)
+        net = FSRCNN(len(state["feature.weight"]), len(state["shrink.weight"]), maps)
+        net.load_state_dict(state)
+    except (KeyError, TypeError, RuntimeError):
+        raise Error(f"{path}: weights of another network, expected those of fsrcnn") from None
+    for name, tensor in state.items():
+        if not tensor.isfinite().all():
+            raise Error(f"{path}: {name} holds a value that is not finite, expected weights of fsrcnn")
     return net.to(device).eval().requires_grad_(False)

@@ -1,6 +1,5 @@
-//! `nirspi train degrade`: writes scenes and the virtual camera's pictures of them to a file.
+//! `nirspi pairs`: writes scenes and the virtual camera's pictures of them to a file.
 
-use super::data::DataArgs;
 use crate::camera::ModelArgs;
 use crate::print;
 use crate::progress::Progress;
@@ -8,25 +7,38 @@ use crate::provenance;
 use crate::report::{Overwrite, ReportArgs};
 use anyhow::Result;
 use nirspi::files::output::{Existing, write_result};
+use nirspi::training::characters::{Characters, Found, write_stacks};
 use nirspi::training::{LinearCamera, pairs};
-use nirspi_eval::train::Found;
 use nirspi_nets::data::Part;
 use nirspi_recon::words::count_of;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Pairs of sharp scenes and the virtual camera's pictures of them, for training elsewhere
+/// Make pairs of sharp scenes and the virtual camera's pictures of them, to train networks on
 ///
 /// Characters fill the field of view at 0.3 to 1.2 m, dry or in rain, and go through projector, receiver, calibration
-/// and reconstruction. Writes x (N, 64, 64), y (N, 32, 32), the blur and noise of each, depth, distance, rain and where
-/// the scene comes from.
+/// and reconstruction. The file has x (N, 64, 64), y (N, 32, 32), the blur and noise of each, depth, distance, rain, and
+/// where the scene comes from. `python -m nirspi.train --pairs FILE` trains on it (docs/training.md).
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n\
-    \x20 nirspi train degrade --data chars74k/ --count 4000 --seed 1 --out pairs.npz")]
+#[command(group = clap::ArgGroup::new("letters").args(["data", "fonts"]).multiple(true))]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi pairs --data letters.npz --count 4000 --out pairs.npz\n\
+    \x20 nirspi pairs --data chars74k/ --characters letters/ --count 4000 --out pairs.npz")]
 pub struct Args {
-    #[command(flatten)]
-    data: DataArgs,
+    /// Characters: a .npz stack (x, label, family or writer), a folder of such files, or Chars74K's folder; may be given
+    /// several times. Without --data and --fonts, scenes are shapes
+    #[arg(long, value_name = "PATH")]
+    data: Vec<PathBuf>,
+    /// A folder of .ttf and .otf fonts, from which 0-9, A-Z and a-z are drawn
+    #[arg(long, value_name = "DIR")]
+    fonts: Vec<PathBuf>,
+    /// Share of the font families, writers and photographs of which no pairs are made
+    #[arg(long, value_name = "0..1", default_value_t = 0.1)]
+    held_out: f64,
+    /// Share of the scenes that are no letters
+    #[arg(long, value_name = "0..1", default_value_t = 0.15)]
+    shapes: f32,
     #[command(flatten)]
     model: ModelArgs,
     /// Pairs to make
@@ -36,9 +48,12 @@ pub struct Args {
     /// Seed. The same seed gives the same file; pair k is the same in a longer file
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Use the held-out groups instead of the groups to train on
+    /// Make pairs of the held-out groups instead of the others
     #[arg(long)]
     only_held_out: bool,
+    /// Write the characters of --data and --fonts to this new folder, a .npz stack each, for `python -m nirspi.train --data`
+    #[arg(long, value_name = "DIR", requires = "letters")]
+    characters: Option<PathBuf>,
     /// File to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -62,9 +77,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     // The scenes are in folders of pictures, whose names differ from a file of arrays.
     let existing = Existing::of(args.overwrite.overwrite, None);
     existing.check(&args.out)?;
-    let (scenes, data) = args.data.data().scenes(args.seed)?;
+    let characters = Characters {
+        stacks: args.data.clone(),
+        fonts: args.fonts.clone(),
+        held_out: args.held_out,
+        shapes: args.shapes,
+    };
+    let (scenes, data) = characters.scenes(args.seed)?;
     let camera = LinearCamera::new(&args.model.read()?, args.seed)?;
-    let bar = Progress::of("degrade", args.count, "pairs");
+    if let Some(folder) = &args.characters {
+        write_stacks(folder, &scenes)?;
+    }
+    let bar = Progress::of("pairs", args.count, "pairs");
     let part = if args.only_held_out { Part::HeldOut } else { Part::Training };
     let count = args.count as usize;
     let pairs = pairs::take(&scenes, part, &camera, count, args.seed, &|| bar.add(1))?;
