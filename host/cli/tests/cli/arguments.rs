@@ -1,6 +1,6 @@
 //! Arguments, help, and where the output goes.
 
-use crate::bench::{Bench, first_bytes};
+use crate::bench::{Bench, first_bytes, program};
 use std::process::{Command, Stdio};
 
 const COMMANDS: [&str; 22] = [
@@ -171,7 +171,7 @@ fn an_order_table_that_is_no_permutation_is_refused() {
 fn a_reader_that_stops_reading_is_no_failure() {
     let bench = Bench::new();
     let demo = bench.path("demo");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_nirspi"))
+    let mut child = Command::new(program())
         .args(["demo", "--frames", "1", "--json", "--out"])
         .arg(&demo)
         .stdout(Stdio::piped())
@@ -184,7 +184,7 @@ fn a_reader_that_stops_reading_is_no_failure() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     assert!(demo.join("report.json").exists());
 
-    let mut child = Command::new(env!("CARGO_BIN_EXE_nirspi"))
+    let mut child = Command::new(program())
         .arg("--help")
         .stdout(Stdio::piped())
         .spawn()
@@ -198,7 +198,7 @@ fn a_reader_that_stops_reading_is_no_failure() {
 fn output_that_cannot_be_written_is_a_failure() {
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output =
-        Command::new(env!("CARGO_BIN_EXE_nirspi")).arg("devices").stdout(full).output().unwrap();
+        Command::new(program()).arg("devices").stdout(full).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     let line = String::from_utf8(output.stderr).unwrap();
     assert!(line.lines().count() == 1 && line.contains("cannot write to stdout"), "{line}");

@@ -56,12 +56,12 @@ impl Bench {
 
     /// Starts `nirspi` with these arguments, in the folder.
     pub fn start(&self, arguments: &[&str]) -> Process {
-        self.spawn(&mut heeding_signals(env!("CARGO_BIN_EXE_nirspi")), arguments)
+        self.spawn(&mut heeding_signals(&program()), arguments)
     }
 
     /// Runs `nirspi` with these variables in its environment, to its end.
     pub fn run_with(&self, variables: &[(&str, &str)], arguments: &[&str]) -> Outcome {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_nirspi"));
+        let mut program = Command::new(program());
         program.envs(variables.iter().copied());
         self.spawn(&mut program, arguments).wait()
     }
@@ -77,7 +77,7 @@ impl Bench {
     pub fn start_limited(&self, commands: &str, arguments: &[&str]) -> Process {
         let mut shell = heeding_signals("sh");
         let script = format!("{commands}; exec \"$0\" \"$@\"");
-        shell.args(["-c", &script, env!("CARGO_BIN_EXE_nirspi")]);
+        shell.args(["-c", &script, &program()]);
         self.spawn(&mut shell, arguments)
     }
 
@@ -110,6 +110,11 @@ impl Bench {
     pub fn run(&self, arguments: &[&str]) -> Outcome {
         self.start(arguments).wait()
     }
+}
+
+/// The program under test: the one of `NIRSPI_CLI`, or that which was built with the tests.
+pub fn program() -> String {
+    std::env::var("NIRSPI_CLI").unwrap_or_else(|_| env!("CARGO_BIN_EXE_nirspi").to_owned())
 }
 
 /// A program that ignores no signal at its start. Tests that are started by `nohup`, or in the background of a script,

@@ -1,6 +1,6 @@
 //! The small image that `nirspi capture` shows on a terminal while it runs.
 
-use crate::bench::Bench;
+use crate::bench::{self, Bench};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use std::fs::File;
 use std::io::Read;
@@ -14,7 +14,7 @@ fn written_to_a_terminal(no_colour: Option<&str>, more: &[&str]) -> String {
     unlockpt(&master).unwrap();
     let path = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
     let terminal = File::options().write(true).open(path).unwrap();
-    let mut program = Command::new(env!("CARGO_BIN_EXE_nirspi"));
+    let mut program = Command::new(bench::program());
     program
         .args(["capture", "--frames", "4000", "--no-calibration", "--adc-latency", "6"])
         .args(more)

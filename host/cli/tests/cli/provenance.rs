@@ -87,6 +87,7 @@ fn says(outcome: Outcome, origin: Origin, name: &str) -> Provenance {
 const SIMULATED: Origin = Origin::Simulated;
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn pictures_and_reports_of_a_recording_name_its_camera() {
     let bench = Bench::new();
     let capture = ["capture", "--frames", "20", "--out", "rec.mcap", "--picture", "seen"];
@@ -200,6 +201,7 @@ fn readings_of_others_are_named_by_their_file() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn tables_charts_and_times_are_signed() {
     let bench = Bench::new();
     for (arguments, name, folder, count, origin) in [

@@ -16,6 +16,7 @@ fn stack() -> Vec<u8> {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn every_row_is_measured_on_the_same_unseen_images() {
     let bench = Bench::new();
     bench.write("own.npz", &stack());

@@ -100,6 +100,7 @@ fn ranges_stand_beside_the_papers_and_the_plot_is_written() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn curves_of_rain_are_written_as_pictures_and_numbers() {
     let bench = Bench::new();
     let out = ["rain", "--drops", "mono:2", "--out", "curves"];
@@ -130,6 +131,7 @@ fn a_scene_in_rain_is_captured_and_its_seed_repeats_it() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn weather_of_any_kind_stands_before_the_virtual_camera() {
     let bench = Bench::new();
     bench.write("counted.csv", b"0.5,3000\n1,400\n");
@@ -170,6 +172,7 @@ fn weather_of_any_kind_stands_before_the_virtual_camera() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn table_3_has_both_cameras_at_every_distance_with_intervals() {
     let bench = Bench::new();
     let arguments = [

@@ -155,21 +155,25 @@ fn every_line_of_the_readme_runs_as_it_stands() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn every_line_of_the_first_picture_runs_as_it_stands() {
     assert_eq!(runs_as_it_stands(&Bench::new(), "docs/first-picture.md").len(), 7);
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn every_line_of_the_page_about_measurements_runs_as_it_stands() {
     assert_eq!(runs_as_it_stands(&Bench::new(), "docs/measurements.md").len(), 9);
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn every_line_of_how_it_works_runs_as_it_stands() {
     assert_eq!(runs_as_it_stands(&Bench::new(), "docs/how-it-works.md").len(), 2);
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn every_line_of_the_other_pages_runs_as_it_stands() {
     for page in pages().iter().filter(|page| !ALONE.contains(&page.as_str())) {
         runs_as_it_stands(&Bench::new(), page);
