@@ -184,11 +184,7 @@ fn a_reader_that_stops_reading_is_no_failure() {
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     assert!(demo.join("report.json").exists());
 
-    let mut child = Command::new(program())
-        .arg("--help")
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = Command::new(program()).arg("--help").stdout(Stdio::piped()).spawn().unwrap();
     assert_eq!(first_bytes(&mut child.stdout.take().unwrap(), 2), b"An");
     assert!(child.wait().unwrap().success());
 }
@@ -197,8 +193,7 @@ fn a_reader_that_stops_reading_is_no_failure() {
 #[test]
 fn output_that_cannot_be_written_is_a_failure() {
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let output =
-        Command::new(program()).arg("devices").stdout(full).output().unwrap();
+    let output = Command::new(program()).arg("devices").stdout(full).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     let line = String::from_utf8(output.stderr).unwrap();
     assert!(line.lines().count() == 1 && line.contains("cannot write to stdout"), "{line}");
