@@ -4,6 +4,10 @@
 //! A run waits for its next frame for 5 s and ten frames of the camera's clock, or for a minute and
 //! ten frames of the host's: the clock of a simulated camera may be slower, and that of a defective one
 //! may stand still (`tests::a_run_without_frames_ends_by_either_clock`).
+//!
+//! The camera's wait is that between two of its statuses. A frame has the time of the FPGA's clock, which
+//! is slower than the processor's where the FPGA is simulated
+//! (`tests::the_times_of_frames_do_not_count`).
 
 use crate::clock::Instant;
 use std::time::Duration;
@@ -22,7 +26,7 @@ pub(super) struct FramesDue {
     late: Duration,
     /// When the newest frame came, or the run began.
     last: Instant,
-    /// The camera's time then; `None` before the first status of the run.
+    /// The camera's time in the first status after it; `None` before that status.
     last_device_us: Option<u64>,
     /// The camera's time in its newest status.
     device_us: u64,
@@ -36,8 +40,8 @@ impl FramesDue {
     }
 
     /// A new frame has come.
-    pub(super) fn frame(&mut self, now: Instant, device_time_us: u64) {
-        (self.last, self.last_device_us) = (now, Some(device_time_us));
+    pub(super) fn frame(&mut self, now: Instant) {
+        (self.last, self.last_device_us) = (now, None);
     }
 
     /// The camera has told its time.
@@ -91,7 +95,8 @@ mod tests {
         let mut due = FramesDue::new(1e6, began);
         for frame in 1..100_u32 {
             let now = began + frame * 4 * SECOND;
-            due.frame(now, u64::from(frame) * 4_000_000);
+            due.frame(now);
+            due.status(u64::from(frame) * 4_000_000);
             due.status(u64::from(frame) * 4_000_000 + 3_999_999);
             assert_eq!(due.overdue(now + 3 * SECOND), None, "{frame}");
         }
@@ -100,5 +105,18 @@ mod tests {
         assert_eq!(due.overdue(began + 4001 * SECOND), None);
         due.status(4_006_000_000);
         assert!(due.overdue(began + 4007 * SECOND).is_some());
+    }
+
+    /// Statuses ten seconds apart in the camera's time, with a frame between each two.
+    #[test]
+    fn the_times_of_frames_do_not_count() {
+        let began = Instant::now();
+        let mut due = FramesDue::new(1e6, began);
+        for turn in 1..100_u32 {
+            let now = began + turn * SECOND;
+            due.status(u64::from(turn) * 10_000_000);
+            assert_eq!(due.overdue(now), None, "{turn}");
+            due.frame(now);
+        }
     }
 }

@@ -118,7 +118,7 @@ impl Listener for Packets<'_> {
         run.junk.packet(raw.len(), content, run.tally.arrived() > before, now);
         match content {
             Ok(DeviceMessage::Frame(frame)) if received => {
-                run.due.frame(now, frame.device_time_us);
+                run.due.frame(now);
                 observer.frame(frame, &run.tally.account().counters());
             }
             Ok(message) => observer.message(message),
