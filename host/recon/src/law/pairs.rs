@@ -5,7 +5,7 @@
 //! more light of coarse patterns. Readings of other patterns know little of each other.
 
 use super::dropout::{dark_level, local_level};
-use super::robust::{correlation_of_changes, deviation, median, running_median};
+use super::robust::{correlation_of_changes, deviation, median, running_median, step};
 use super::{
     Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, Outlier, Reading, dropout, few,
     repeats,
@@ -22,6 +22,10 @@ const LAW_SIGMAS: f64 = 8.0;
 /// break the law, and if none does.
 const BETTER: f64 = 4.0;
 const FAR_BETTER: f64 = 8.0;
+
+/// Fisher's z of a correlation of 0.99: partners that know this much of each other are right, also where
+/// others know more. A single point of light makes partners of many patterns.
+const SURE_PARTNERS: f64 = 2.65;
 
 /// How many times farther apart all-on and all-off are in a form that explains readings better.
 const MORE_APART: f64 = 1.05;
@@ -168,11 +172,12 @@ fn sums(pairs: &[[f64; 2]]) -> Vec<f64> {
     pairs.iter().map(|[plus, minus]| plus + minus).collect()
 }
 
-/// Standard deviation of the sums of pairs about their level.
+/// Standard deviation of the sums of pairs about their level, which is known to a [`step`] only.
 fn noise(pairs: &[[f64; 2]]) -> f64 {
     let sums = sums(pairs);
     let level = running_median(&sums, LEVEL);
-    deviation(level.iter().zip(&sums).map(|(level, sum)| (level - sum).abs()))
+    let step = step(pairs.as_flattened());
+    deviation(level.iter().zip(&sums).map(|(level, sum)| (level - sum).abs() + step))
 }
 
 /// How much the readings of a pair know of each other, as Fisher's z of a correlation, whose standard
@@ -321,9 +326,10 @@ fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
     let [on, off] = pairs[brightest];
     // Other partners are the right ones, and not in any form that is known.
     let gain = |other: &[[f64; 2]]| (partnership(other) - own) * (other.len() as f64).sqrt();
-    if [&rearranged, &shifted]
-        .into_iter()
-        .any(|other| !other.is_empty() && gain(other) > FAR_BETTER)
+    if own < SURE_PARTNERS
+        && [&rearranged, &shifted]
+            .into_iter()
+            .any(|other| !other.is_empty() && gain(other) > FAR_BETTER)
     {
         return says(Explanation::Unknown);
     }

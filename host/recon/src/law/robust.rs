@@ -14,6 +14,17 @@ pub(super) fn deviation(magnitudes: impl Iterator<Item = f64>) -> f64 {
     *magnitudes.select_nth_unstable_by(nine_tenths, f64::total_cmp).1 / SIGMAS_OF_NINE_TENTHS
 }
 
+/// The least difference between two values that differ by more than rounding: one photon, or one count of a
+/// converter. Where single photons are counted, most deviations are 0 or 1 of them.
+pub(super) fn step(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let rounding = 8.0 * f64::EPSILON * largest;
+    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|&step| step > rounding);
+    steps.reduce(f64::min).unwrap_or(0.0)
+}
+
 /// The median, or the upper of the two middle values; 0 of none.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {

@@ -1,6 +1,6 @@
 //! Readings of patterns alone, and differences: one value a pattern.
 
-use super::robust::{deviation, median};
+use super::robust::{deviation, median, step};
 use super::{
     Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, OVERLOAD, Outlier, Reading, few,
     repeats,
@@ -36,12 +36,14 @@ pub fn keeps_the_law(rows: &[u32], d: &[f64]) -> bool {
     }
 }
 
-/// Standard deviation of the finer half of the patterns, an upper bound of the noise.
+/// Standard deviation of the finer half of the patterns, an upper bound of the noise. It is known to a
+/// [`step`] only.
 fn noise(rows: &Rows, values: &[f64]) -> f64 {
     let fine = order::positions_by_sequency(rows);
     let fine: Vec<f64> = fine[fine.len() / 2..].iter().map(|&k| values[k]).collect();
     let middle = median(fine.clone());
-    deviation(fine.iter().map(|v| (v - middle).abs()))
+    let step = step(&fine);
+    deviation(fine.iter().map(|v| (v - middle).abs() + step))
 }
 
 pub(super) fn read_single(
@@ -91,7 +93,7 @@ pub(super) fn read_single(
             // Every reading has the dark level in it.
             let least = y.iter().copied().fold(f64::INFINITY, f64::min);
             let greatest = y.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let tolerance = (LAW_SHARE * (greatest - least)).max(MANY_SIGMAS * noise(&rows, &y));
+            let tolerance = (LAW_SHARE * (greatest - least)).max(LAW_SIGMAS * noise(&rows, &y));
             if level <= least + tolerance {
                 (measurements, dark_level) = (lifted, Some(level));
             } else {
