@@ -11,6 +11,7 @@
 //! a gap of `g` frames with `d` damaged packets in it, `min(g, d)` are corrupt and the rest are
 //! lost.
 
+use nirspi_wire::PacketError;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -78,6 +79,110 @@ impl std::fmt::Display for LossCounters {
     }
 }
 
+/// A check that a packet failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Check {
+    /// No delimiter within the longest packet.
+    Length,
+    /// The code of the packet's bytes.
+    Cobs,
+    /// The checksum.
+    Crc,
+    /// The setup of the measurement, which an intact frame contradicts.
+    Setup,
+}
+
+impl Check {
+    /// The check that this packet failed; `None` for an intact message of a newer version.
+    #[must_use]
+    pub fn of(error: PacketError) -> Option<Self> {
+        match error {
+            PacketError::Message => None,
+            PacketError::BufferTooSmall | PacketError::TooLong => Some(Self::Length),
+            PacketError::Cobs => Some(Self::Cobs),
+            PacketError::Crc => Some(Self::Crc),
+        }
+    }
+
+    /// What is wrong with such a packet.
+    #[must_use]
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Length => "longer than any packet",
+            Self::Cobs => "broken COBS code",
+            Self::Crc => "wrong CRC-32",
+            Self::Setup => "another frame than the setup has",
+        }
+    }
+}
+
+/// How many packets failed each check.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct FailedChecks {
+    /// Number of packets without a delimiter within the longest packet.
+    pub length: u64,
+    /// Number of packets with a broken code.
+    pub cobs: u64,
+    /// Number of packets with a wrong checksum.
+    pub crc: u64,
+    /// Number of intact frames that contradict the setup.
+    pub setup: u64,
+}
+
+impl FailedChecks {
+    fn add(&mut self, check: Check) {
+        *match check {
+            Check::Length => &mut self.length,
+            Check::Cobs => &mut self.cobs,
+            Check::Crc => &mut self.crc,
+            Check::Setup => &mut self.setup,
+        } += 1;
+    }
+
+    /// Each check, and how many packets failed it.
+    #[must_use]
+    pub fn each(&self) -> [(Check, u64); 4] {
+        let Self { length, cobs, crc, setup } = *self;
+        [(Check::Length, length), (Check::Cobs, cobs), (Check::Crc, crc), (Check::Setup, setup)]
+    }
+
+    /// Number of damaged packets, of frames or not.
+    #[must_use]
+    pub fn packets(&self) -> u64 {
+        self.each().iter().map(|(_, packets)| packets).sum()
+    }
+
+    /// The checks that no packet of `before` failed.
+    pub fn first_after(self, before: Self) -> impl Iterator<Item = Check> {
+        let both = self.each().into_iter().zip(before.each());
+        both.filter(|((_, now), (_, before))| *now > 0 && *before == 0).map(|((check, _), _)| check)
+    }
+}
+
+/// The failed checks of two runs.
+impl std::ops::Add for FailedChecks {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            length: self.length + other.length,
+            cobs: self.cobs + other.cobs,
+            crc: self.crc + other.crc,
+            setup: self.setup + other.setup,
+        }
+    }
+}
+
+impl std::fmt::Display for FailedChecks {
+    /// The checks that packets failed, as `wrong CRC-32 in 2, broken COBS code in 1`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let failed = self.each().into_iter().filter(|(_, packets)| *packets > 0);
+        let failed: Vec<String> =
+            failed.map(|(check, packets)| format!("{} in {packets}", check.in_words())).collect();
+        f.write_str(&failed.join(", "))
+    }
+}
+
 /// Accounts for the frames of one run.
 #[derive(Debug, Clone, Default)]
 pub struct LossAccount {
@@ -89,7 +194,7 @@ pub struct LossAccount {
     /// Counted gaps, oldest first.
     gaps: VecDeque<Range<u64>>,
     repeated: u64,
-    damaged_packets: u64,
+    failed: FailedChecks,
 }
 
 impl LossAccount {
@@ -138,10 +243,10 @@ impl LossAccount {
         Arrival::Late
     }
 
-    /// Counts a damaged packet.
-    pub fn damaged(&mut self) {
+    /// Counts a packet that failed this check.
+    pub fn damaged(&mut self, check: Check) {
         self.damaged += 1;
-        self.damaged_packets += 1;
+        self.failed.add(check);
     }
 
     /// Records how many frames the camera reports to have made.
@@ -187,10 +292,10 @@ impl LossAccount {
         self.repeated
     }
 
-    /// Number of damaged packets, of frames or not.
+    /// The checks that damaged packets failed.
     #[must_use]
-    pub fn damaged_packets(&self) -> u64 {
-        self.damaged_packets
+    pub fn failed_checks(&self) -> FailedChecks {
+        self.failed
     }
 }
 
@@ -223,7 +328,7 @@ mod tests {
             for (sequence, fate) in (0u32..).zip(&fates) {
                 match fate {
                     Fate::Lost => {}
-                    Fate::Damaged => account.damaged(),
+                    Fate::Damaged => account.damaged(Check::Crc),
                     Fate::Delayed if delayed.is_none() => delayed = Some(sequence),
                     _ => {
                         prop_assert_eq!(account.frame(sequence), Arrival::Received);
@@ -273,7 +378,7 @@ mod tests {
     fn a_damaged_frame_is_corrupt_and_not_lost() {
         let mut account = LossAccount::new();
         account.frame(0);
-        account.damaged();
+        account.damaged(Check::Crc);
         account.frame(2);
         let expected = LossCounters { received: 2, lost: 0, corrupt: 1, late: 0 };
         assert_eq!(account.counters(), expected);

@@ -23,7 +23,7 @@ pub use preview::Preview;
 pub use report::CaptureReport;
 pub use run::Run;
 
-use crate::account::LossCounters;
+use crate::account::{FailedChecks, LossCounters};
 use crate::calibration::{CalibrationError, Settling};
 use crate::clock::Instant;
 use crate::files::interrupt::Signal;
@@ -77,8 +77,8 @@ pub struct Progress {
     pub waited: Option<Duration>,
     /// The camera's time of the newest frame.
     pub device_time_us: u64,
-    /// Number of damaged packets of any kind.
-    pub damaged_packets: u64,
+    /// The checks that damaged packets of any kind failed.
+    pub failed_checks: FailedChecks,
     /// Share of the recording's queue that waits for the disk, 0 to 1; 0 without a recording.
     pub queued: f64,
 }
@@ -172,8 +172,8 @@ pub struct Capture {
     pub integrated: Integrated,
     /// The loss counters.
     pub counters: LossCounters,
-    /// Number of damaged packets of any kind.
-    pub damaged_packets: u64,
+    /// The checks that damaged packets of any kind failed.
+    pub failed_checks: FailedChecks,
     /// Number of intact messages that this program does not know and skipped.
     pub unknown_packets: u64,
     /// Number of frames that arrived twice.

@@ -2,12 +2,13 @@
 
 use crate::causes::in_one_line;
 use crate::link::usb::{self, UsbCamera, identify::check_version};
-use crate::link::{TcpLink, serial_ports};
+use crate::link::{CameraAddress, TcpLink, serial_ports};
 use crate::session::{CameraIdentity, Session, SessionError};
 use serde::Serialize;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
+use thiserror::Error;
 
 /// Default address of `nirspi virtual`.
 pub const DEFAULT_TCP: &str = "127.0.0.1:1550";
@@ -52,6 +53,45 @@ impl fmt::Display for Device {
             (None, None, None) => Ok(()),
         }
     }
+}
+
+/// The camera that is meant where none is named, and what a user should know of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Meant {
+    /// Its address.
+    pub address: CameraAddress,
+    /// Why it is the one, in one line.
+    pub because: String,
+}
+
+/// Several cameras are there, and none was named.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{} cameras on USB ({}), expected one, or an address", .0.len(), .0.join(", "))]
+pub struct SeveralCameras(Vec<String>);
+
+/// The camera that is meant where none is named: the one on USB, or the virtual one if there is none.
+///
+/// # Errors
+/// [`SeveralCameras`] if there are several on USB.
+pub fn meant() -> Result<Meant, SeveralCameras> {
+    of_those_on_usb(usb::usb_cameras())
+}
+
+fn of_those_on_usb(found: io::Result<Vec<UsbCamera>>) -> Result<Meant, SeveralCameras> {
+    let (address, because) = match found.as_deref() {
+        Ok([]) => (CameraAddress::Virtual, "no camera on USB: this is the virtual one".to_owned()),
+        Ok([camera]) => {
+            (CameraAddress::Usb(camera.serial.clone()), format!("{camera}: the one camera on USB"))
+        }
+        Ok(several) => {
+            return Err(SeveralCameras(several.iter().map(UsbCamera::to_string).collect()));
+        }
+        Err(error) => {
+            let why = in_one_line(error);
+            (CameraAddress::Virtual, format!("USB not listed ({why}): this is the virtual camera"))
+        }
+    };
+    Ok(Meant { address, because })
 }
 
 /// The virtual camera of this program, the cameras at these TCP addresses and at the default one,
@@ -128,4 +168,29 @@ fn on_serial_ports() -> Vec<Device> {
         Device::new(camera).noting(&note)
     };
     ports.into_iter().map(device).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_one_camera_is_meant_and_several_are_named() {
+        let camera =
+            |serial: &str| UsbCamera { serial: Some(serial.to_owned()), protocol: Some(4) };
+        let meant = of_those_on_usb(Ok(vec![camera("77")])).unwrap();
+        assert_eq!(meant.address, CameraAddress::Usb(Some("77".to_owned())));
+        assert_eq!(meant.because, "usb:77: the one camera on USB");
+        let several = of_those_on_usb(Ok(vec![camera("77"), camera("78")])).unwrap_err();
+        let words = "2 cameras on USB (usb:77, usb:78), expected one, or an address";
+        assert_eq!(several.to_string(), words);
+        for (found, words) in [
+            (Ok(Vec::new()), "no camera on USB: this is the virtual one"),
+            (Err(io::Error::other("no rights")), "USB not listed (no rights): this is the virtual"),
+        ] {
+            let meant = of_those_on_usb(found).unwrap();
+            assert_eq!(meant.address, CameraAddress::Virtual);
+            assert!(meant.because.starts_with(words), "{}", meant.because);
+        }
+    }
 }

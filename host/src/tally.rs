@@ -3,7 +3,7 @@
 //!
 //! A recording gives the same tally as the capture that made it.
 
-use crate::account::{Arrival, LossAccount};
+use crate::account::{Arrival, Check, LossAccount};
 use crate::integrate::Integrated;
 use crate::recording::{Recording, RecordingError};
 use crate::setup::MeasurementSetup;
@@ -87,8 +87,10 @@ impl Tally {
                 _ => {}
             },
             Ok(_) => {}
-            Err(PacketError::Message) => self.unknown += 1,
-            Err(_) => self.account.damaged(),
+            Err(error) => match Check::of(*error) {
+                Some(check) => self.account.damaged(check),
+                None => self.unknown += 1,
+            },
         }
         false
     }
@@ -101,7 +103,7 @@ impl Tally {
         if let Some(misfit) = self.misfit_of(frame) {
             // An intact frame that does not fit the setup counts as damaged.
             self.misfit.get_or_insert(misfit);
-            self.account.damaged();
+            self.account.damaged(Check::Setup);
             return false;
         }
         let received = self.account.frame(frame.sequence) == Arrival::Received;
@@ -152,7 +154,7 @@ impl Tally {
     /// Whether any packet of the run, whole or damaged, has arrived.
     #[must_use]
     pub fn has_begun(&self) -> bool {
-        self.account.accounted() > 0 || self.account.damaged_packets() > 0
+        self.account.accounted() > 0 || self.account.failed_checks().packets() > 0
     }
 
     /// The camera's time of the newest frame.

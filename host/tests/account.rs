@@ -1,6 +1,6 @@
 //! Every frame is counted once, in whatever order the frames of a gap come late.
 
-use nirspi::account::{Arrival, LossAccount, LossCounters};
+use nirspi::account::{Arrival, Check, LossAccount, LossCounters};
 use proptest::prelude::*;
 
 proptest! {
@@ -42,10 +42,10 @@ fn the_frames_before_and_after_a_late_one_can_still_come() {
 fn a_late_frame_of_a_gap_that_counts_as_corrupt_takes_back_a_corrupt_one() {
     let mut account = LossAccount::new();
     account.frame(0);
-    account.damaged();
+    account.damaged(Check::Crc);
     account.frame(2);
     let counted = LossCounters { received: 2, corrupt: 1, ..LossCounters::default() };
-    assert_eq!((account.counters(), account.damaged_packets()), (counted, 1));
+    assert_eq!((account.counters(), account.failed_checks().packets()), (counted, 1));
     assert_eq!(account.frame(1), Arrival::Late);
     let counted = LossCounters { received: 2, late: 1, ..LossCounters::default() };
     assert_eq!(account.counters(), counted);
@@ -58,7 +58,10 @@ fn a_number_before_the_first_frame_counts_as_repeated_and_as_no_frame() {
         assert_eq!(account.frame(u32::MAX), Arrival::Repeated);
         assert_eq!((account.repeated(), account.accounted()), (times, 0));
     }
-    assert_eq!((account.counters(), account.damaged_packets()), (LossCounters::default(), 0));
+    assert_eq!(
+        (account.counters(), account.failed_checks().packets()),
+        (LossCounters::default(), 0)
+    );
 }
 
 #[test]
@@ -84,7 +87,7 @@ fn accounts_add_up_counter_by_counter_and_are_complete_if_all_frames_were_receiv
 fn a_report_of_no_more_frames_than_have_come_changes_nothing() {
     let mut account = LossAccount::new();
     (0..3).for_each(|sequence| assert_eq!(account.frame(sequence), Arrival::Received));
-    account.damaged();
+    account.damaged(Check::Crc);
     let before = account.counters();
     for made in [1, 3] {
         account.made(made);

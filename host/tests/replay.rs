@@ -132,7 +132,7 @@ fn a_capture_of_a_replay_has_the_packets_of_the_recording() {
             );
             let [copy, first] = [&mut copy, &mut first].map(|rec| tally_recording(rec).unwrap());
             assert_eq!(copy.account().counters(), first.account().counters());
-            assert_eq!(copy.account().damaged_packets(), first.account().damaged_packets());
+            assert_eq!(copy.account().failed_checks(), first.account().failed_checks());
             assert_eq!(captured.setup.rows.len(), 256);
         }
     }

@@ -9,8 +9,8 @@ use super::report::ReportArgs;
 use super::{print, provenance};
 use anyhow::{Context, Result, anyhow};
 use nirspi::calibration::{
-    KeptCalibration, KeptFlatField, Settling, Sweeps, calibrate, flat_field_path_of, measure_dark,
-    measure_flat_field, path_of,
+    KeptCalibration, KeptFlatField, Settling, Sweeps, calibrate, measure_dark, measure_flat_field,
+    path_of,
 };
 use nirspi::exposure::{Length, Light};
 use nirspi::session::{IgnorePackets, Session};
@@ -104,21 +104,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.dark {
         return run_dark(args);
     }
-    let mut session =
-        address::open(&args.camera.camera, &SceneArgs::white_sheet(&args.model, args.seed))?;
+    let address = args.camera.address(args.report.json)?;
+    let mut session = address::open(&address, &SceneArgs::white_sheet(&args.model, args.seed))?;
     let settling = calibrate(&mut session, &mut IgnorePackets)
-        .with_context(|| format!("{}: not calibrated", args.camera.camera))?;
+        .with_context(|| format!("{address}: not calibrated"))?;
     let camera = session.identity().clone();
-    let file = match &args.calibration {
-        Some(path) => path.clone(),
-        None => path_of(&camera.serial)?,
-    };
     let kept = KeptCalibration::new(camera, settling, Vec::new(), SystemTime::now());
     let flat_field = match args.white {
-        true => Some(white(args, &mut session, &kept.settling)?),
+        true => {
+            let measured = white(args, &mut session, &kept.settling);
+            Some(measured.with_context(|| format!("{address}: no flat field"))?)
+        }
         false => None,
     };
-    kept.write(&file)?;
+    let file = kept.keep(args.calibration.as_deref())?;
     let summary = flat_field.as_ref().map(|(flat, _)| flat.summary());
     let flat_field = flat_field.map(|(flat, file)| FlatFieldReport::new(&flat, file));
     let report = Report { kept, file, flat_field };
@@ -173,18 +172,16 @@ fn white(
     let bar = Progress::of("flat field", sweeps.map + 2 * sweeps.check, "sweeps");
     let measured = measure_flat_field(session, &setup, settling, sweeps, &mut bar.watch());
     drop(bar);
-    let measured = measured.with_context(|| format!("{}: no flat field", args.camera.camera))?;
     let camera = session.identity().clone();
-    let file = flat_field_path_of(&camera.serial)?;
-    let kept = KeptFlatField::new(camera, measured, sweeps, SystemTime::now());
-    kept.write(&file)?;
+    let kept = KeptFlatField::new(camera, measured?, sweeps, SystemTime::now());
+    let file = kept.keep(None)?;
     Ok((kept, file))
 }
 
 /// Adds a dark frame to the flat field that is kept.
 fn run_dark(args: &Args) -> Result<ExitCode> {
-    let mut session =
-        address::open(&args.camera.camera, &SceneArgs::covered(&args.model, args.seed))?;
+    let address = args.camera.address(args.report.json)?;
+    let mut session = address::open(&address, &SceneArgs::covered(&args.model, args.seed))?;
     let camera = session.identity().clone();
     let kept = KeptFlatField::of(&camera)?.ok_or_else(|| {
         let serial = &camera.serial;
@@ -196,10 +193,8 @@ fn run_dark(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("dark frame", 2 * u64::from(sweeps), "sweeps");
     let flat = measure_dark(&mut session, &setup, &settling, flat, sweeps, &mut bar.watch());
     drop(bar);
-    let kept =
-        kept.renewed(flat.with_context(|| format!("{}: no dark frame", args.camera.camera))?);
-    let file = flat_field_path_of(&camera.serial)?;
-    kept.write(&file)?;
+    let kept = kept.renewed(flat.with_context(|| format!("{address}: no dark frame"))?);
+    let file = kept.keep(None)?;
     let provenance = provenance::of_camera(&camera);
     args.report.print(&FlatFieldReport::new(&kept, file), &provenance, |dark| {
         print::line(format_args!(

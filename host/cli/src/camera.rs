@@ -1,9 +1,10 @@
 //! Arguments for the camera, for the scene of a virtual camera, and for the measurement.
 
-use super::Usage;
 use super::address::CameraAddress;
+use super::{Usage, print};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use nirspi::devices;
 use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
@@ -24,8 +25,35 @@ const SCENE_PX: usize = 256;
 pub struct CameraArgs {
     /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT, serial:PATH[:BAUD], or replay:REC[,SPEED]: a recording that
     /// is played back with its own setup and calibration, at 1, 0.5, ... times the camera's time or at max speed
-    #[arg(long, value_name = "CAMERA", default_value = "virtual")]
-    pub camera: CameraAddress,
+    /// [default: the one camera on USB; virtual if there is none]
+    #[arg(long, value_name = "CAMERA")]
+    camera: Option<CameraAddress>,
+}
+
+impl CameraArgs {
+    /// Whether a recording plays the camera.
+    pub fn is_replay(&self) -> bool {
+        matches!(self.camera, Some(CameraAddress::Replay(_)))
+    }
+
+    /// The camera's address, and which camera that is if none was named.
+    pub fn meant(&self) -> Result<(CameraAddress, Option<String>)> {
+        if let Some(address) = &self.camera {
+            return Ok((address.clone(), None));
+        }
+        let meant = devices::meant().map_err(|several| Usage(format!("--camera: {several}")))?;
+        Ok((meant.address, Some(meant.because)))
+    }
+
+    /// The camera's address. If none was named, a note says which it is, unless the result is JSON, which
+    /// names the camera.
+    pub fn address(&self, json: bool) -> Result<CameraAddress> {
+        let (address, because) = self.meant()?;
+        if let (Some(because), false) = (because, json) {
+            print::note(because)?;
+        }
+        Ok(address)
+    }
 }
 
 /// What stands before a virtual camera.

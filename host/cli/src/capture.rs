@@ -10,7 +10,6 @@ use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, StopCaus
 use nirspi::exposure::Light;
 use nirspi::files::interrupt;
 use nirspi::files::output::refuse_dash;
-use nirspi::link::CameraAddress;
 use nirspi::picture::half_blocks;
 use nirspi::recording::Target;
 use nirspi_recon::words::count;
@@ -71,7 +70,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     setup.adc_latency = args.calibration.adc_latency();
     let mut frames = args.frames;
     if let Some(light) = args.light {
-        if matches!(args.camera.camera, CameraAddress::Replay(_)) {
+        if args.camera.is_replay() {
             let why = "a recording has its own frames, use --frames";
             return Err(Usage(format!("--light with --camera replay: {why}")).into());
         }
@@ -81,7 +80,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let target = target(args)?;
     let seconds = args.seconds;
     let stop = interrupt::stop_flag();
-    let mut session = address::open(&args.camera.camera, &args.scene)?;
+    let mut session = address::open(&args.camera.address(args.report.json)?, &args.scene)?;
     let choice = args.calibration.choose(&setup, session.identity())?;
     let options = CaptureOptions {
         setup,

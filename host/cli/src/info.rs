@@ -33,6 +33,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .print_answer(&RecordingInfo::read(recording)?, |info| print::line(info));
     }
     let scene = SceneArgs::white_sheet(&args.model, 1);
-    let report = info(&mut address::open_quietly(&args.camera.camera, &scene)?)?;
+    let report =
+        info(&mut address::open_quietly(&args.camera.address(args.report.json)?, &scene)?)?;
     args.report.print_answer(&report, |report| print::line(report))
 }

@@ -30,8 +30,47 @@ pub struct ManArgs {
 pub fn completions(args: &CompletionsArgs) -> Result<ExitCode> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut arranged(Cli::command()), "nirspi", &mut script);
-    print::line(String::from_utf8_lossy(&script).trim_end())?;
+    let script = String::from_utf8_lossy(&script);
+    let script = match args.shell {
+        clap_complete::Shell::Bash => with_files(&script),
+        _ => script.into_owned(),
+    };
+    print::line(script.trim_end())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The script for bash, which then offers files where a file or any other value can stand. The generated
+/// one offers options there, and names of files without their spaces. Bash itself offers files where a
+/// script offers nothing.
+fn with_files(script: &str) -> String {
+    const OPTIONS: &str = "COMPREPLY=( $(compgen -W \"${opts}\" -- \"${cur}\") )";
+    const FILES: &str = "COMPREPLY=($(compgen -f \"${cur}\"))";
+    let mut changed = String::new();
+    // Whether the part for one command, so far, is for one that takes no words of a list.
+    let (mut takes_files, mut offered) = (false, false);
+    for line in script.lines() {
+        let code = line.trim_start();
+        if let Some(words) = code.strip_prefix("opts=\"") {
+            let mut words = words.trim_end_matches('"').split(' ').filter(|word| !word.is_empty());
+            (takes_files, offered) = (words.all(|word| word.starts_with(['-', '[', '<'])), false);
+        }
+        let line = match code {
+            FILES => line.replace(FILES, "COMPREPLY=()"),
+            OPTIONS if takes_files && offered => line.replace(OPTIONS, "COMPREPLY=()"),
+            OPTIONS => {
+                offered = true;
+                line.to_owned()
+            }
+            _ if takes_files && code.starts_with("if [[ ${cur} == -* || ") => {
+                let indent = &line[..line.len() - code.len()];
+                format!("{indent}if [[ ${{cur}} == -* ]] ; then")
+            }
+            _ => line.to_owned(),
+        };
+        changed.push_str(&line);
+        changed.push('\n');
+    }
+    changed
 }
 
 pub fn man(args: &ManArgs) -> Result<ExitCode> {

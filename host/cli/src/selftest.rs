@@ -5,7 +5,7 @@ use super::progress::Progress;
 use super::report::ReportArgs;
 use super::{address, print, provenance};
 use anyhow::{Result, bail};
-use nirspi::calibration::{KeptCalibration, path_of};
+use nirspi::calibration::KeptCalibration;
 use nirspi::selftest::{Check, LinkDemands, STAGES, SelfTest, Verdict, run as test};
 use nirspi::session::CameraIdentity;
 use serde::Serialize;
@@ -48,13 +48,12 @@ struct Report<'r> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut session = address::open(&args.camera.camera, &args.scene)?;
+    let address = args.camera.address(args.report.json)?;
+    let mut session = address::open(&address, &args.scene)?;
     let camera = session.identity().clone();
     let bar = Progress::of("self-test", STAGES.len(), "stages");
-    let demands = LinkDemands {
-        min_frames_per_s: args.camera.camera.min_frames_per_s(),
-        duration: LINK_DURATION,
-    };
+    let demands =
+        LinkDemands { min_frames_per_s: address.min_frames_per_s(), duration: LINK_DURATION };
     let found = test(&mut session, demands, &mut |stage| {
         bar.set(stage + 1);
         bar.say(STAGES.get(stage).copied().unwrap_or_default());
@@ -86,13 +85,9 @@ fn keep(
     found: &SelfTest,
 ) -> Result<Option<(KeptCalibration, PathBuf)>> {
     let Some(settling) = found.settling.clone().filter(|_| found.passed()) else { return Ok(None) };
-    let path = match &args.calibration {
-        Some(path) => path.clone(),
-        None => path_of(&camera.serial)?,
-    };
     let now = SystemTime::now();
     let kept = KeptCalibration::new(camera.clone(), settling, found.checks.clone(), now);
-    kept.write(&path)?;
+    let path = kept.keep(args.calibration.as_deref())?;
     Ok(Some((kept, path)))
 }
 

@@ -122,16 +122,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         imaging.check_warm_start(settings.method).map_err(refused)?;
     }
     let stop = interrupt::stop_flag();
-    let session = address::open(&args.camera.camera, &args.scene)?;
+    let (address, because) = args.camera.meant()?;
+    let session = address::open(&address, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
-    print::line(server.invitation(&args.camera.camera))?;
+    print::line(server.invitation(&address))?;
+    if let Some(because) = because {
+        print::note(because)?;
+    }
     let camera = CameraSource {
-        address: args.camera.camera.to_string(),
+        address: address.to_string(),
         setup: setup.clone(),
         model: args.scene.model.read()?,
-        scene: scene(args)?,
+        scene: scene(args, &address)?,
         record_to: args.record_to.clone(),
-        connect: connect(args, setup),
+        connect: connect(args, address, setup),
     };
     let served = serve(server, camera, connected, imaging, settings, &stop)?;
     print::line(format_args!("stopped: {served}"))?;
@@ -146,8 +150,8 @@ fn device(args: &Args) -> Result<Device> {
 }
 
 /// The scene before a virtual camera in this process.
-fn scene(args: &Args) -> Result<Option<StagedScene>> {
-    if args.camera.camera != CameraAddress::Virtual {
+fn scene(args: &Args, address: &CameraAddress) -> Result<Option<StagedScene>> {
+    if *address != CameraAddress::Virtual {
         return Ok(None);
     }
     let (map, optics) = args.scene.optics()?;
@@ -166,9 +170,8 @@ fn prepared(
 }
 
 /// A function that connects to the camera again.
-fn connect(args: &Args, setup: MeasurementSetup) -> Connect {
-    let (camera, staged, calibration) =
-        (args.camera.camera.clone(), args.scene.clone(), args.calibration.clone());
+fn connect(args: &Args, camera: CameraAddress, setup: MeasurementSetup) -> Connect {
+    let (staged, calibration) = (args.scene.clone(), args.calibration.clone());
     let found = move |scene: Option<&StagedScene>| {
         let mut session = match scene {
             Some(scene) => {

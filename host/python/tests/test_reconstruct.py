@@ -78,7 +78,9 @@ def test_one_measurement_of_a_file_is_that_of_load(tmp_path):
     assert made.shape == (16, 16) and (made == expected).all() and made.report == expected.report
     with pytest.raises(TypeError, match="an argument that needs the path of a file: side"):
         ns.reconstruct(measured(), side=32)
-    with pytest.raises(TypeError, match="an unexpected keyword argument: sides"):
+    with pytest.raises(TypeError, match="an unexpected keyword argument: sampeling, expected sampling$"):
+        ns.reconstruct(measured(), sampeling=0.3)
+    with pytest.raises(TypeError, match="an unexpected keyword argument: sides, expected side$"):
         ns.reconstruct(path, index=7, sides=32)
 
 

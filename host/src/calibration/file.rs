@@ -1,7 +1,9 @@
 //! Files that are kept for a camera between sessions: what calibrations and flat fields share.
 
+use super::kept::path_with;
 use crate::files::output::keep;
 use crate::files::{FileError, read_small_text};
+use crate::session::CameraIdentity;
 use etcetera::HomeDirError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -101,6 +103,18 @@ pub enum KeptFileError {
         /// The property of this camera.
         expected: String,
     },
+    /// The file to write holds that of another camera.
+    #[error("{path}: holds the {kept} of {found}, and this camera is {camera}: name another file")]
+    Owned {
+        /// The file.
+        path: PathBuf,
+        /// What is kept in it.
+        kept: Kept,
+        /// Board and serial number in the file.
+        found: String,
+        /// Board and serial number of this camera.
+        camera: String,
+    },
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] FileError),
@@ -114,8 +128,28 @@ impl Kept {
         KeptFileError::Format { path: path.to_owned(), kept: self, reason: reason.to_string() }
     }
 
+    /// Keeps what was measured of a camera in the named file, which holds nothing or the same of the same
+    /// camera, or in the camera's own file with this ending. Returns the path.
+    pub(super) fn keep<Kind: DeserializeOwned>(
+        self,
+        named: Option<&Path>,
+        camera: &CameraIdentity,
+        ending: &str,
+        content: &impl Serialize,
+    ) -> Result<PathBuf, KeptFileError> {
+        let path = match named {
+            Some(path) => path.to_owned(),
+            None => path_with(&camera.serial, ending)?,
+        };
+        if named.is_some() && path.exists() {
+            self.check_owner::<Kind>(&path, camera)?;
+        }
+        self.write(&path, content)?;
+        Ok(path)
+    }
+
     /// Writes the file, whole or not at all.
-    pub(super) fn write(self, path: &Path, content: &impl Serialize) -> Result<(), KeptFileError> {
+    fn write(self, path: &Path, content: &impl Serialize) -> Result<(), KeptFileError> {
         let json = match self {
             Self::Calibration => serde_json::to_vec_pretty(content),
             // Two thousand numbers, not one on each line.
@@ -137,11 +171,7 @@ impl Kept {
             _kind: Kind,
             version: u32,
         }
-        let text = read_small_text(path).map_err(|source| KeptFileError::Io {
-            path: path.to_owned(),
-            kept: self,
-            source,
-        })?;
+        let text = self.text(path)?;
         let head: Head<Kind> =
             serde_json::from_str(&text).map_err(|e| self.format_error(path, &e))?;
         if head.version != self.format() {
@@ -149,6 +179,42 @@ impl Kept {
             return Err(KeptFileError::Version { path, kept: self, found });
         }
         serde_json::from_str(&text).map_err(|e| self.format_error(path, &e))
+    }
+
+    /// Refuses a file that is not this camera's to replace: one whose field `kind` is no `Kind`, and one
+    /// of another camera.
+    fn check_owner<Kind: DeserializeOwned>(
+        self,
+        path: &Path,
+        camera: &CameraIdentity,
+    ) -> Result<(), KeptFileError> {
+        /// The fields that say whose a file is, of any version.
+        #[derive(Deserialize)]
+        struct Owned<Kind> {
+            #[serde(rename = "kind")]
+            _kind: Kind,
+            camera: Owner,
+        }
+        #[derive(Deserialize)]
+        struct Owner {
+            board: String,
+            serial: String,
+        }
+        let text = self.text(path)?;
+        let owned: Owned<Kind> =
+            serde_json::from_str(&text).map_err(|e| self.format_error(path, &e))?;
+        let Owner { board, serial } = owned.camera;
+        if (&board, &serial) == (&camera.board, &camera.serial) {
+            return Ok(());
+        }
+        let found = format!("{board} {serial}");
+        let camera = format!("{} {}", camera.board, camera.serial);
+        Err(KeptFileError::Owned { path: path.to_owned(), kept: self, found, camera })
+    }
+
+    fn text(self, path: &Path) -> Result<String, KeptFileError> {
+        let error = |source| KeptFileError::Io { path: path.to_owned(), kept: self, source };
+        read_small_text(path).map_err(error)
     }
 
     /// Refuses a file of which a property is not that of the camera: name, in the file, of the camera.

@@ -21,6 +21,9 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// The ending of the file's name.
+const ENDING: &str = "json";
+
 /// A calibration in its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KeptCalibration {
@@ -67,12 +70,13 @@ impl KeptCalibration {
         &self.measured
     }
 
-    /// Writes the file, whole or not at all.
+    /// Keeps the calibration in a file, whole or not at all: in the camera's own, or in the `named` one.
+    /// A calibration of the same camera there is replaced. Returns the path.
     ///
     /// # Errors
-    /// If the folder cannot be made, or the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), KeptFileError> {
-        Kept::Calibration.write(path, self)
+    /// If the named file holds anything else, the folder cannot be made, or the file cannot be written.
+    pub fn keep(&self, named: Option<&Path>) -> Result<PathBuf, KeptFileError> {
+        Kept::Calibration.keep::<Kind>(named, &self.camera, ENDING, self)
     }
 
     /// Reads the file for use with `camera`.
@@ -100,7 +104,7 @@ impl KeptCalibration {
 /// # Errors
 /// If the user has no home directory.
 pub fn path_of(serial: &str) -> Result<PathBuf, KeptFileError> {
-    path_with(serial, "json")
+    path_with(serial, ENDING)
 }
 
 /// The path of a file of the camera with this serial number, with this ending.
@@ -162,7 +166,7 @@ mod tests {
     fn a_calibration_comes_back_as_it_was() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("made/for/it/a.json");
-        kept().write(&path).unwrap();
+        assert_eq!(kept().keep(Some(&path)).unwrap(), path);
         assert_eq!(KeptCalibration::read(&path, &camera()).unwrap(), kept());
         assert_eq!(kept().measured(), "2026-11-20 08:30 UTC");
     }
@@ -171,7 +175,7 @@ mod tests {
     fn a_calibration_of_something_else_is_refused_in_one_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.json");
-        kept().write(&path).unwrap();
+        assert_eq!(kept().keep(Some(&path)).unwrap(), path);
         type Change<'c> = (&'c str, &'c dyn Fn(&mut CameraIdentity));
         let changes: [Change<'_>; 4] = [
             ("serial number A 1", &|camera| camera.serial = "B2".into()),
@@ -188,6 +192,28 @@ mod tests {
         // Newer firmware with the same gateware does not change the path from light to sample.
         let newer = CameraIdentity { firmware: "9.9.9".into(), ..camera() };
         KeptCalibration::read(&path, &newer).unwrap();
+    }
+
+    #[test]
+    fn a_calibration_replaces_none_of_another_camera_and_no_other_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        let mut real = kept();
+        (real.camera.board, real.camera.serial) = ("nucleo".into(), "77".into());
+        real.keep(Some(&path)).unwrap();
+        let newer = KeptCalibration { measured_unix_s: 1, ..real.clone() };
+        newer.keep(Some(&path)).unwrap();
+        assert_eq!(KeptCalibration::read(&path, &real.camera).unwrap(), newer);
+        let error = kept().keep(Some(&path)).unwrap_err().to_string();
+        assert!(
+            error.contains("calibration of nucleo 77, and this camera is virtual A 1"),
+            "{error}"
+        );
+        assert_eq!(KeptCalibration::read(&path, &real.camera).unwrap(), newer);
+        std::fs::write(&path, "my notes").unwrap();
+        let error = kept().keep(Some(&path)).unwrap_err().to_string();
+        assert!(error.contains("expected a calibration"), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"my notes");
     }
 
     #[test]

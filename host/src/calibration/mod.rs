@@ -20,8 +20,8 @@ pub use burst::{BURSTS, CalibrationError, HALF_PERIOD, Settling, calibrate, cali
 pub use check::SettlingError;
 pub use file::{Kept, KeptFileError};
 pub use flat::{
-    FlatField, FlatFieldError, FramesError, KeptFlatField, Measured, Sweeps, flat_field_path_of,
-    measure_dark, measure_flat_field, pattern_noise,
+    FlatField, FlatFieldError, FramesError, KeptFlatField, Measured, Sweeps, measure_dark,
+    measure_flat_field, pattern_noise,
 };
 pub(crate) use kept::date;
 pub use kept::{KeptCalibration, path_of};

@@ -78,12 +78,15 @@ impl Capture {
         }
     }
 
-    /// Damaged packets that were not frames of the run. Their content is unknown.
+    /// Damaged packets: the checks that they failed, and how many were no frames of the run.
     fn packets(&self) -> Option<String> {
-        let others = self.damaged_packets.saturating_sub(self.counters.corrupt);
-        (others > 0).then(|| {
-            let packets = if others == 1 { "packet" } else { "packets" };
-            format!("{others} damaged {packets} beyond these frames, of unknown content")
+        let packets = self.failed_checks.packets();
+        let others = match packets.saturating_sub(self.counters.corrupt) {
+            0 => String::new(),
+            others => format!("; {others} of them of unknown content, beyond these frames"),
+        };
+        (packets > 0).then(|| {
+            format!("{}: {}{others}", count(packets, "damaged packet"), self.failed_checks)
         })
     }
 }
@@ -97,6 +100,7 @@ fn frames(counters: LossCounters) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::account::FailedChecks;
     use crate::files::interrupt::Signal;
     use crate::integrate::Integrated;
     use crate::session::{CameraIdentity, SessionError};
@@ -119,6 +123,10 @@ mod tests {
         }
     }
 
+    fn wrong_crc(packets: u64) -> FailedChecks {
+        FailedChecks { crc: packets, ..Default::default() }
+    }
+
     /// A capture of 50 frames without anything missing.
     fn whole() -> Capture {
         let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
@@ -129,7 +137,7 @@ mod tests {
             settling: None,
             calibration_problem: None,
             counters: LossCounters { received: 50, ..Default::default() },
-            damaged_packets: 0,
+            failed_checks: FailedChecks::default(),
             unknown_packets: 0,
             repeated: 0,
             status: None,
@@ -160,21 +168,28 @@ mod tests {
                 Capture {
                     counters: short(),
                     made: Some(3),
-                    damaged_packets: 1,
+                    failed_checks: wrong_crc(1),
                     ended: Ended::Fault(Fault::Interlock),
                     ..whole()
                 },
-                &["LEDs off after 3 of 50 frames", "interlock", "1 damaged packet beyond"],
+                &[
+                    "LEDs off after 3 of 50 frames",
+                    "interlock",
+                    "1 damaged packet: wrong CRC-32 in 1; 1 of them of unknown",
+                ],
             ),
             (
                 Capture {
                     counters: LossCounters { received: 48, lost: 1, corrupt: 1, late: 0 },
-                    damaged_packets: 1,
+                    failed_checks: FailedChecks { cobs: 1, ..Default::default() },
                     ..whole()
                 },
-                &["of 50 frames made: 48 received, 1 lost, 1 corrupt, 0 late"],
+                &[
+                    "of 50 frames made: 48 received, 1 lost, 1 corrupt, 0 late",
+                    "1 damaged packet: broken COBS code in 1",
+                ],
             ),
-            (Capture { damaged_packets: 2, ..whole() }, &["2 damaged packets"]),
+            (Capture { failed_checks: wrong_crc(2), ..whole() }, &["2 damaged packets"]),
             (Capture { ended: Ended::Unconfirmed(no_answer()), ..whole() }, &["whether a fault"]),
             (
                 Capture { ended: Ended::Stopped(StopCause::User), made: Some(7), ..whole() },

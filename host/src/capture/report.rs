@@ -1,7 +1,7 @@
 //! The report of a capture, for people and scripts.
 
 use super::Capture;
-use crate::account::LossCounters;
+use crate::account::{FailedChecks, LossCounters};
 use crate::calibration::{Choice, Origin};
 use crate::causes::in_one_line;
 use crate::session::CameraIdentity;
@@ -25,6 +25,8 @@ pub struct CaptureReport<'r> {
     pub made: Option<u64>,
     /// Number of damaged packets of any kind.
     pub damaged_packets: u64,
+    /// How many of them failed which check.
+    pub failed_checks: FailedChecks,
     /// Messages that this program does not know.
     pub unknown_packets: u64,
     /// Frames that arrived twice.
@@ -77,7 +79,8 @@ impl<'r> CaptureReport<'r> {
             bytes: std::fs::metadata(path)?.len(),
             frames: counters,
             made: captured.made,
-            damaged_packets: captured.damaged_packets,
+            damaged_packets: captured.failed_checks.packets(),
+            failed_checks: captured.failed_checks,
             unknown_packets: captured.unknown_packets,
             repeated: captured.repeated,
             asked: captured.asked,

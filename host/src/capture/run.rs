@@ -276,7 +276,7 @@ impl Run {
                 elapsed: self.started.elapsed(),
                 waited: Some(session.waited()),
                 device_time_us: self.tally.device_time_us(),
-                damaged_packets: self.tally.account().damaged_packets(),
+                failed_checks: self.tally.account().failed_checks(),
                 queued: self.recorder.as_ref().map_or(0.0, Recorder::queued),
             };
             let cause = match observer.watch(&progress) {
@@ -359,7 +359,7 @@ impl Run {
             calibration_problem: self.calibration_problem,
             integrated: self.tally.integrated().clone(),
             counters: account.counters(),
-            damaged_packets: account.damaged_packets(),
+            failed_checks: account.failed_checks(),
             unknown_packets: self.tally.unknown_packets(),
             repeated: account.repeated(),
             status: self.status,

@@ -1,7 +1,7 @@
 //! What a recording holds, for people and scripts.
 
 use super::{Recording, RecordingError, RunAccount};
-use crate::account::LossCounters;
+use crate::account::{FailedChecks, LossCounters};
 use crate::calibration::date;
 use crate::session::CameraIdentity;
 use crate::tally::hear_recording;
@@ -29,6 +29,8 @@ pub struct RecordingInfo {
     pub packets: u64,
     /// The loss counters, counted again.
     pub frames: LossCounters,
+    /// How many damaged packets failed which check.
+    pub failed_checks: FailedChecks,
     /// The account as the capture wrote it; `null` if the recording is cut short.
     pub account: Option<RunAccount>,
     /// Number of the recorded run.
@@ -86,6 +88,7 @@ impl RecordingInfo {
             host_seconds: seconds(times, 1e-9),
             packets: end.packets,
             frames: tally.account().counters(),
+            failed_checks: tally.account().failed_checks(),
             account: end.account,
             run,
             patterns: setup.rows.len(),
@@ -122,6 +125,9 @@ impl fmt::Display for RecordingInfo {
         let (device, host) = (self.device_seconds, self.host_seconds);
         let packets = count(self.packets, "packet");
         writeln!(f, "{} in {packets}", self.frames)?;
+        if self.failed_checks.packets() > 0 {
+            writeln!(f, "damaged packets: {}", self.failed_checks)?;
+        }
         write!(f, "{device:.6} s by the camera's clock, {host:.3} s by the computer's")?;
         match &self.account {
             None => write!(f, "\nno account at the end: the capture did not end by itself")?,

@@ -46,7 +46,7 @@ impl Monitor {
         Some(Telemetry {
             device_time_us: tally.device_time_us(),
             counters,
-            damaged_packets: tally.account().damaged_packets(),
+            damaged_packets: tally.account().failed_checks().packets(),
             frames_per_s,
             status: self.status,
         })

@@ -12,7 +12,7 @@ use super::overload::Load;
 use super::settings::Measuring;
 use super::stage::StagedScene;
 use super::{ForeignError, Shared, lock};
-use crate::account::LossCounters;
+use crate::account::{FailedChecks, LossCounters};
 use crate::calibration::{CalibrationError, FlatField, KeptFlatField, Settling};
 use crate::capture::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
@@ -225,8 +225,8 @@ pub(super) struct Live {
     known: Option<(String, Settling)>,
     /// The loss counters of all earlier runs.
     earlier: LossCounters,
-    /// The damaged packets of all earlier runs.
-    damaged: u64,
+    /// The failed checks of all earlier runs.
+    failed: FailedChecks,
     now: Option<(Arc<RunSetup>, Newest)>,
     /// The flat field of the connected camera.
     flat_field: Option<FlatField>,
@@ -258,7 +258,7 @@ impl Live {
             plan: Plan::default(),
             known: None,
             earlier: LossCounters::default(),
-            damaged: 0,
+            failed: FailedChecks::default(),
             now: None,
             flat_field: None,
             depth: None,
@@ -402,8 +402,8 @@ impl Live {
             // The run has ended, the camera has not.
             Err(error @ (CaptureError::Recording { .. } | CaptureError::RecordingCut { .. })) => {
                 if let CaptureError::RecordingCut { counters, .. } = &error {
-                    self.earlier = self.earlier + *counters;
-                    self.damaged = lock(&self.shared.camera).camera.said.damaged_packets;
+                    self.ended_with(*counters);
+                    self.failed = lock(&self.shared.camera).camera.said.failed_checks;
                 }
                 self.record_no_more();
                 lock(&self.shared.camera).event(Level::Error, causes::in_one_line(&error));
@@ -418,9 +418,8 @@ impl Live {
             })) => return Ok(Some(End::Fault(fault))),
             Err(error) => return Ok(Some(End::Gone(causes::in_one_line(&error)))),
         };
-        self.earlier = self.earlier + captured.counters;
-        self.damaged += captured.damaged_packets;
-        self.shared.slot.account(self.earlier);
+        self.ended_with(captured.counters);
+        self.failed = self.failed + captured.failed_checks;
         let missing = captured.missing();
         if let Some(path) = &captured.recording {
             self.recorded(path, captured.counters.received);
@@ -444,6 +443,12 @@ impl Live {
             self.record_no_more();
         }
         Ok(end)
+    }
+
+    /// Records the account of a run that has ended.
+    fn ended_with(&mut self, run: LossCounters) {
+        self.shared.slot.account(self.earlier, run);
+        self.earlier = self.earlier + run;
     }
 
     /// Reports a recording.
@@ -490,9 +495,10 @@ impl Observer for Live {
             run: Arc::clone(run),
             depth: self.depth.clone(),
             arrived: self.arrived,
+            counters: *counters,
             newest: self.offered,
         };
-        self.shared.slot.offer(look, self.earlier + *counters);
+        self.shared.slot.offer(look, self.earlier, *counters);
     }
 
     fn message(&mut self, message: &DeviceMessage<'_>) {
@@ -511,9 +517,9 @@ impl Observer for Live {
     }
 
     fn watch(&mut self, progress: &Progress) -> ControlFlow<StopCause> {
-        self.shared.slot.account(self.earlier + progress.counters);
-        let damaged = self.damaged + progress.damaged_packets;
-        lock(&self.shared.camera).camera.said.counted(progress.device_time_us, damaged);
+        self.shared.slot.account(self.earlier, progress.counters);
+        let failed = self.failed + progress.failed_checks;
+        lock(&self.shared.camera).counted(progress.device_time_us, failed);
         self.look_at_load(progress);
         match self.goes_on() {
             true => ControlFlow::Continue(()),

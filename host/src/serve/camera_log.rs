@@ -1,6 +1,7 @@
 //! The state of the camera and its events, in words.
 
 use super::light::Leds;
+use crate::account::FailedChecks;
 use crate::boards;
 use crate::clock::{self, Instant};
 use crate::events::Level;
@@ -89,17 +90,10 @@ impl CameraState {
 pub struct Said {
     /// The camera's time of the newest frame of the run.
     pub device_time_us: u64,
-    /// Damaged packets of all runs.
-    pub damaged_packets: u64,
+    /// How many packets of all runs failed each check.
+    pub failed_checks: FailedChecks,
     /// The last status; `null` before the first.
     pub status: Option<Status>,
-}
-
-impl Said {
-    /// Records what the host has counted of a run so far.
-    pub fn counted(&mut self, device_time_us: u64, damaged_packets: u64) {
-        (self.device_time_us, self.damaged_packets) = (device_time_us, damaged_packets);
-    }
 }
 
 /// A short description of the measurement.
@@ -187,6 +181,18 @@ impl CameraLog {
         self.camera.line = line;
     }
 
+    /// Records what the host has counted so far. The first packet that fails a check is an event.
+    pub fn counted(&mut self, device_time_us: u64, failed_checks: FailedChecks) {
+        let before = self.camera.said.failed_checks;
+        for check in failed_checks.first_after(before) {
+            let wrong = check.in_words();
+            let line = format!("a damaged packet: {wrong}; further ones of this kind are counted");
+            self.event(Level::Warning, line);
+        }
+        let said = &mut self.camera.said;
+        (said.device_time_us, said.failed_checks) = (device_time_us, failed_checks);
+    }
+
     /// Records an event.
     pub fn event(&mut self, level: Level, text: String) {
         let unix_ms = clock::since_1970().as_millis() as u64;
@@ -237,6 +243,21 @@ mod tests {
         let known = camera.leds_known;
         camera.leds_are(Leds::Unknown);
         assert_eq!(camera.leds_known, known);
+    }
+
+    #[test]
+    fn the_first_packet_that_fails_a_check_is_an_event_and_further_ones_are_counted() {
+        let mut log = CameraLog::new("test", &identity());
+        let before = log.events().len();
+        for (crc, cobs) in [(0, 0), (1, 0), (2, 0), (2, 1), (9, 9)] {
+            log.counted(0, FailedChecks { crc, cobs, ..FailedChecks::default() });
+        }
+        let texts: Vec<&str> =
+            log.events().iter().skip(before).map(|event| event.text.as_str()).collect();
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        assert!(texts[0].starts_with("a damaged packet: wrong CRC-32; further ones"));
+        assert!(texts[1].starts_with("a damaged packet: broken COBS code; "));
+        assert_eq!(log.camera.said.failed_checks.packets(), 18);
     }
 
     #[test]

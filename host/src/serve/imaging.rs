@@ -8,6 +8,7 @@ use super::moving::Moving;
 use super::settings::{Offer, Settings, alternatives};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
+use crate::account::LossCounters;
 use crate::calibration::FlatField;
 use crate::causes;
 use crate::clock::{self, Instant};
@@ -229,6 +230,14 @@ pub struct Picture {
     /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
     pub arrived_unix_ms: u64,
     method: &'static str,
+    /// Name of the patterns' order.
+    order: String,
+    /// Number of patterns shown.
+    patterns: usize,
+    /// Sweeps summed into one frame.
+    sweeps: u32,
+    /// The loss counters of the image's run, with its newest frame.
+    run_frames: LossCounters,
     /// What the image takes from the images before, in words; `null` if it takes nothing.
     past: Option<String>,
     /// Number of summed frames.
@@ -269,6 +278,10 @@ impl Picture {
             arrived: Instant::now(),
             arrived_unix_ms: clock::since_1970().as_millis() as u64,
             method: "hadamard",
+            order: String::new(),
+            patterns: 1024,
+            sweeps: 1,
+            run_frames: LossCounters::default(),
             past: None,
             frames: 1,
             white_counts: 2.0,
@@ -454,6 +467,10 @@ impl Imaging {
             arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed()))
                 .as_millis() as u64,
             method: settings.method,
+            order: look.run.setup.order.clone(),
+            patterns: look.run.setup.rows.len(),
+            sweeps: look.run.setup.sweeps,
+            run_frames: look.counters,
             past: report.warm.then(|| report.note.unwrap_or_default()),
             frames: look.sum.frames(),
             white_counts,

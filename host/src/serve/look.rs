@@ -1,5 +1,6 @@
 //! What the imaging thread gets of the newest frames.
 
+use crate::account::LossCounters;
 use crate::calibration::{FlatField, Settling};
 use crate::clock::Instant;
 use crate::integrate::Integrated;
@@ -38,6 +39,8 @@ pub struct Look {
     pub depth: Option<Arc<DepthImage>>,
     /// When the newest frame came out of the link.
     pub arrived: Instant,
+    /// The loss counters of its run, with the newest frame.
+    pub counters: LossCounters,
     /// Number of the newest frame among those received, from 1 on.
     pub newest: u64,
 }

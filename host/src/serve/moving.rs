@@ -99,6 +99,7 @@ impl Moving {
 #[cfg(feature = "virtual-camera")]
 mod tests {
     use super::*;
+    use crate::account::LossCounters;
     use crate::clock::Instant;
     use crate::integrate::Integrated;
     use crate::scene::{SceneMap, SceneSource};
@@ -168,6 +169,7 @@ mod tests {
                 run: Arc::clone(run),
                 depth: None,
                 arrived: Instant::now(),
+                counters: LossCounters::default(),
                 newest: u64::from(FRAMES) * (k + 1),
             };
             assert!(moving.awaits(&look, &settings));
@@ -227,7 +229,8 @@ mod tests {
             let (mut sum, arrived) = (Integrated::new(&run.setup), Instant::now());
             sum.add_sums((0..patterns).map(|k| 1000 / (k as i64 + 1)), 1);
             let measurements = sum.measurements(&run.setup, None, false).unwrap();
-            let look = Look { sum, run: Arc::clone(&run), depth: None, arrived, newest };
+            let counters = LossCounters::default();
+            let look = Look { sum, run: Arc::clone(&run), depth: None, arrived, counters, newest };
             let made = moving.image(&faulty, &measurements, &look, &settings);
             made.ok().map(|made| made.report.warm)
         };

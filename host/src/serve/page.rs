@@ -10,11 +10,12 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Path, type and content of each file that the page loads.
-const FILES: [(&str, &str, &str); 18] = [
+const FILES: [(&str, &str, &str); 19] = [
     ("/page/style.css", STYLE, include_str!("page/style.css")),
     ("/page/main.js", SCRIPT, include_str!("page/main.js")),
     ("/page/connection.js", SCRIPT, include_str!("page/connection.js")),
     ("/page/age.js", SCRIPT, include_str!("page/age.js")),
+    ("/page/account.js", SCRIPT, include_str!("page/account.js")),
     ("/page/windows.js", SCRIPT, include_str!("page/windows.js")),
     ("/page/words.js", SCRIPT, include_str!("page/words.js")),
     ("/page/dom.js", SCRIPT, include_str!("page/dom.js")),

@@ -15,12 +15,14 @@ use std::sync::PoisonError;
 #[cfg(any(test, feature = "serve"))]
 use std::time::Duration;
 
-/// The account of all frames of all runs.
+/// The account of frames and images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Ledger {
-    /// Counts of the frames that the camera made.
+    /// Counts of the frames that the camera made in all runs.
     pub frames: LossCounters,
-    /// Counts of the frames received.
+    /// Counts of the frames that the camera made in the newest run.
+    pub run_frames: LossCounters,
+    /// Counts of the frames received in all runs.
     pub images: ImageCounters,
 }
 
@@ -36,6 +38,12 @@ pub struct ImageCounters {
     pub failed: u64,
     /// Frames in the image being made, or next in the slot.
     pub waiting: u64,
+}
+
+impl Ledger {
+    fn count(&mut self, earlier: LossCounters, run: LossCounters) {
+        (self.frames, self.run_frames) = (earlier + run, run);
+    }
 }
 
 #[derive(Debug)]
@@ -61,10 +69,11 @@ impl<T> Default for Slot<T> {
 }
 
 impl<T> Slot<T> {
-    /// Puts in the look of a received frame. A look that was not taken counts as passed over.
-    pub fn offer(&self, look: T, frames: LossCounters) {
+    /// Puts in the look of a received frame of a run after `earlier` runs. A look that was not taken
+    /// counts as passed over.
+    pub fn offer(&self, look: T, earlier: LossCounters, run: LossCounters) {
         let mut inner = lock(&self.inner);
-        inner.ledger.frames = frames;
+        inner.ledger.count(earlier, run);
         if inner.next.replace(look).is_some() {
             inner.ledger.images.passed_over += 1;
         } else {
@@ -73,9 +82,9 @@ impl<T> Slot<T> {
         self.filled.notify_one();
     }
 
-    /// Updates the account of losses without a received frame.
-    pub fn account(&self, frames: LossCounters) {
-        lock(&self.inner).ledger.frames = frames;
+    /// Updates the account of losses of a run after `earlier` runs, without a received frame.
+    pub fn account(&self, earlier: LossCounters, run: LossCounters) {
+        lock(&self.inner).ledger.count(earlier, run);
     }
 
     /// Wakes the imaging thread without a frame, so that pages learn of a new state at once.
@@ -141,6 +150,9 @@ mod tests {
     use super::*;
     use std::time::Instant;
 
+    /// Ten frames of an earlier run, one of them lost.
+    const EARLIER: LossCounters = LossCounters { received: 9, lost: 1, corrupt: 0, late: 0 };
+
     /// A look that is the number of its frame.
     fn look(number: u64) -> (u64, LossCounters) {
         let frames = LossCounters { received: number, lost: 2, ..LossCounters::default() };
@@ -151,7 +163,7 @@ mod tests {
     fn news_wake_a_resting_thread_and_leave_the_look_in_the_slot() {
         let slot = Slot::default();
         let (first, frames) = look(1);
-        slot.offer(first, frames);
+        slot.offer(first, LossCounters::default(), frames);
         let began = Instant::now();
         slot.await_news(Duration::from_millis(50));
         assert!(began.elapsed() >= Duration::from_millis(50), "a frame is no news");
@@ -166,7 +178,7 @@ mod tests {
         let slot = Slot::default();
         for number in 1..=100u64 {
             let (look, frames) = look(number);
-            slot.offer(look, frames);
+            slot.offer(look, EARLIER, frames);
             if number % 7 == 0 {
                 assert!(slot.take(Duration::ZERO).is_some());
                 // One more frame arrives while the image is made.
@@ -178,9 +190,10 @@ mod tests {
                     _ => slot.done(number % 3 != 0),
                 }
             }
-            let Ledger { frames, images } = slot.ledger();
+            let Ledger { frames, run_frames, images } = slot.ledger();
             let counted = images.shown + images.passed_over + images.failed + images.waiting;
-            assert_eq!((frames.received, frames.lost), (number, 2));
+            assert_eq!((run_frames.received, run_frames.lost), (number, 2));
+            assert_eq!((frames.received, frames.lost), (number + 9, 3));
             assert_eq!(counted, number, "{images:?}");
         }
         let images = slot.ledger().images;

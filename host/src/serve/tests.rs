@@ -423,8 +423,15 @@ fn states_come_while_an_image_takes_long() {
     };
     let run = Arc::new(RunSetup { setup: setup(), settling: None, flat_field: None });
     let sum = crate::integrate::Integrated::new(&run.setup);
-    let look = Look { sum, run, depth: None, arrived: Instant::now(), newest: 1 };
-    shared.slot.offer(look, crate::account::LossCounters::default());
+    let look = Look {
+        sum,
+        run,
+        depth: None,
+        arrived: Instant::now(),
+        counters: Default::default(),
+        newest: 1,
+    };
+    shared.slot.offer(look, Default::default(), Default::default());
     until("begun", || shared.slot.ledger().images.waiting == 1 && published.borrow().number > 0);
     let (began, before) = (Instant::now(), published.borrow().number);
     std::thread::sleep(TOOK / 2);
@@ -564,8 +571,9 @@ fn images_that_are_given_up_are_counted_and_frames_are_not_waited_for() {
         let sum = crate::integrate::Integrated::new(&run.setup);
         offered += 1;
         let (run, arrived) = (Arc::clone(&run), Instant::now());
-        let look = Look { sum, run, depth: None, arrived, newest: offered };
-        shared.slot.offer(look, crate::account::LossCounters::default());
+        let look =
+            Look { sum, run, depth: None, arrived, counters: Default::default(), newest: offered };
+        shared.slot.offer(look, Default::default(), Default::default());
         std::thread::sleep(Duration::from_millis(2));
         assert!(began.elapsed() < LIMIT, "{:?}", shared.slot.ledger());
     }

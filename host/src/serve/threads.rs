@@ -66,7 +66,7 @@ pub struct Served {
 
 impl fmt::Display for Served {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { ledger: Ledger { frames, images }, delays } = self;
+        let Self { ledger: Ledger { frames, images, .. }, delays } = self;
         write!(f, "{frames}; {} shown{delays}", images.shown)
     }
 }

@@ -30,7 +30,7 @@ fn every_frame_is_shown_passed_over_failed_or_waiting() {
             let slot = Arc::clone(&slot);
             thread::spawn(move || {
                 for number in 1..=2 {
-                    slot.offer(number, received(number));
+                    slot.offer(number, Default::default(), received(number));
                     check(slot.ledger());
                 }
             })
@@ -58,7 +58,7 @@ fn a_page_that_reads_the_account_never_sees_a_frame_twice_or_not_at_all() {
         let slot = Arc::<Slot<u64>>::default();
         let camera = {
             let slot = Arc::clone(&slot);
-            thread::spawn(move || slot.offer(1, received(1)))
+            thread::spawn(move || slot.offer(1, Default::default(), received(1)))
         };
         let imaging = {
             let slot = Arc::clone(&slot);
@@ -84,7 +84,7 @@ fn news_wake_a_thread_that_waits_for_a_frame_and_lose_none() {
         };
         let camera = {
             let slot = Arc::clone(&slot);
-            thread::spawn(move || slot.offer(1, received(1)))
+            thread::spawn(move || slot.offer(1, Default::default(), received(1)))
         };
         // News and the frame may come together. What is left then is the news or nothing.
         let taken = slot.take(PATIENCE);

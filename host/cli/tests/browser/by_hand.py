@@ -80,6 +80,7 @@ def message(given):
     }
     state["light"] |= {"allowed": True}
     state["frames"] |= {"received": 12345, "lost": 7, "corrupt": 5, "late": 3}
+    state["run_frames"] |= {"received": 2345, "lost": 1, "corrupt": 0, "late": 2}
     state["images"] |= {"shown": 11, "failed": 2}
     state["rates"] |= {"camera_frames_per_s": 4882.6, "images_per_s": 24.3}
     state["viewers"] = 4
@@ -99,7 +100,12 @@ def message(given):
         "record": False,
     }
     state["picture"] = {
+        "arrived_unix_ms": 1_764_000_000_123,
         "method": "tv",
+        "order": "natural",
+        "patterns": 256,
+        "sweeps": 4,
+        "run_frames": {"received": 640, "lost": 3, "corrupt": 2, "late": 1},
         "past": None,
         "frames": 64,
         "white_counts": 1000.0,
@@ -173,6 +179,15 @@ class Told:
         assert self.sent == list(expected), f"sent {self.sent}, expected {list(expected)}"
         self.sent.clear()
 
+    def stops(self):
+        """The page has sent a stop, and nothing else. On a busy machine it may send a second one before the first is confirmed."""
+        for _ in range(100):
+            if self.sent:
+                break
+            self.page.wait_for_timeout(50)
+        assert self.sent and set(self.sent) == {("stop", None)}, f"sent {self.sent}, expected a stop"
+        self.sent.clear()
+
     def will_have(self, name, words):
         """The same once the page has the answer to its last command."""
         for _ in range(100):
@@ -193,7 +208,12 @@ def facts(browser, address):
     page = told.page
     assert page.title() == "nirspi 77", page.title()
     told.has("camera", "bench 77")
-    told.has("losses", "12\u202f345 received, 7 lost, 5 corrupt, 3 late")
+    told.has("losses", "this run: 2\u202f345 received, 1 lost, 0 corrupt, 2 late")
+    expect(page.locator("#losses")).to_have_class("loss")
+    told.tell(run_frames={"lost": 0, "late": 0})
+    told.has("losses", "this run: 2\u202f345 received, 0 lost, 0 corrupt, 0 late")
+    expect(page.locator("#losses")).not_to_have_class("loss")
+    told.has("since", "of all runs")
     assert rows(page, "account") == [
         ["received", "12\u202f345", ""],
         ["lost", "7", "loss"],
@@ -202,12 +222,15 @@ def facts(browser, address):
         ["shown", "11 of 12\u202f345", ""],
         ["frames without an image", "2", "loss"],
     ], rows(page, "account")
-    assert rows(page, "rates") == [
+    rates = rows(page, "rates")
+    # The one image of this page, in the second in which it came.
+    assert float(rates[2][1]) <= 1, rates
+    assert rates == [
         ["frames from the camera", "4\u202f883", ""],
         ["images reconstructed", "24.3", ""],
-        ["images on this page", "0.0", ""],
+        ["images on this page", rates[2][1], ""],
         ["open pages", "4", ""],
-    ], rows(page, "rates")
+    ], rates
     delays = [
         ["counted", "1.2, 2.5 ms", ""],
         ["reconstructed", "3.4, 5.6 ms", ""],
@@ -280,7 +303,29 @@ def facts(browser, address):
         label = page.locator(f"#{name}-plot").get_attribute("aria-label")
         assert label.startswith(words), f"{name}: {label}"
     assert "between 0.0 and 3.0" in page.locator("#losses-plot").get_attribute("aria-label")
+    counted_anew(told)
     page.close()
+
+
+def counted_anew(told):
+    """A person sets the counters of this page to 0: what was lost before is no loss any more, what is lost then is."""
+    page = told.page
+    page.locator("#reset").click()
+    assert re.fullmatch(r"since \d\d:\d\d:\d\d", page.locator("#since").inner_text()), page.locator("#since").inner_text()
+    assert rows(page, "account") == [
+        ["received", "0", ""],
+        ["lost", "0", ""],
+        ["corrupt", "0", ""],
+        ["late", "0", ""],
+        ["shown", "0 of 0", ""],
+    ], rows(page, "account")
+    told.tell(frames={"received": 12400, "lost": 10}, images={"shown": 13})
+    assert [row[1] for row in rows(page, "account")] == ["55", "1", "0", "0", "2 of 55"], rows(page, "account")
+    assert rows(page, "account")[1][2] == "loss"
+    # A program that was started again has counted less.
+    told.tell(frames={"received": 5, "lost": 0, "corrupt": 0, "late": 0}, images={"shown": 1, "failed": 0})
+    told.has("since", "of all runs")
+    assert [row[1] for row in rows(page, "account")] == ["5", "0", "0", "0", "1 of 5"], rows(page, "account")
 
 
 def pointed(page, name, side, x, y):
@@ -333,15 +378,20 @@ def pictures(browser, address):
 def saved(told):
     """The sheet says whose image it is, and the arrays have the numbers that were told."""
     page = told.page
+    doubt = "the readings contradict the image, so its strokes are not to be trusted"
+    told.tell(picture={"warnings": [doubt]})
     page.evaluate("written.length = 0")
     with page.expect_download():
         page.locator("#save").click()
-    lines = [line for line in page.evaluate("written") if not re.fullmatch(r"[\d.\u202f]+", line)]
-    assert re.fullmatch(r"simulated; bench 77, \d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", lines[0]), lines
-    assert lines[1:] == [
-        "tv, 64 frames, white 1000.0 ADC counts; enlarged and deblurred: blur 1.23 px, noise 0.045 of white",
-        "12345 received, 7 lost, 5 corrupt, 3 late",
+    lines = [line for line in page.evaluate("written") if not re.fullmatch(r"[\d.\u202f]+(, at most [\d.\u202f]+)?", line)]
+    assert lines == [
+        "simulated; bench 77, 2025-11-24T16:00:00.123Z, scene letter R, 0.30 m, none",
+        "natural order, 256 of 1024 patterns, sweeps in a frame: 4, 64 frames",
+        "tv, white 1000.0 ADC counts; enlarged and deblurred: blur 1.23 px, noise 0.045 of white",
+        "this run: 640 received, 3 lost, 2 corrupt, 1 late",
+        f"warning: {doubt}",
     ], lines
+    told.tell(picture={"warnings": []})
     files = []
     page.on("download", lambda file: files.append(file))
     page.locator("#save-npy").click()
@@ -385,13 +435,15 @@ def history(told):
         told.message,
     )
     assert page.locator("#scrub").get_attribute("max") == "299"
-    # The images on this page are counted in whole seconds.
-    page.wait_for_timeout(1100)
-    image(5)
-    page.wait_for_timeout(1100)
-    image(6)
-    rate = dict(row[:2] for row in rows(page, "rates"))["images on this page"]
-    assert 0.1 <= float(rate) < 1, f"one image in somewhat over a second: {rate} a second"
+    # The images on this page are counted in whole seconds. Those of a busy machine may come in the second after.
+    found = []
+    for number in range(5, 15):
+        page.wait_for_timeout(1100)
+        image(number)
+        found.append(float(dict(row[:2] for row in rows(page, "rates"))["images on this page"]))
+        if 0.1 <= found[-1] < 1:
+            break
+    assert 0.1 <= found[-1] < 1, f"one image in somewhat over a second: {found} a second"
 
 
 def controls(browser, address):
@@ -510,20 +562,21 @@ def lights(told):
             told.sends(("start", None))
         for stop in [page.locator("#stop").click, lambda: page.keyboard.press("Escape"), lambda: page.keyboard.press("Space")]:
             stop()
-            told.sends(("stop", None))
+            told.stops()
             # A confirmed stop is not sent again.
             told.tell(camera={"leds": "off"}, light={"allowed": False, "commands": 50})
+    told.sent.clear()
     page.wait_for_timeout(1100)
     told.sends()
     expect(page.locator("#alarm")).to_be_hidden()
     # A stop that the camera does not confirm is said after a second, and sent again; a state from before it confirms nothing.
     told.answer = {"json": {"run": False, "command": 51}}
     page.keyboard.press("Escape")
-    told.sends(("stop", None))
+    told.stops()
     told.tell()
     page.wait_for_timeout(1300)
     expect(page.locator("#alarm")).to_contain_text("The camera has not confirmed that its LEDs are off")
-    told.sends(("stop", None))
+    told.stops()
     told.tell(light={"commands": 51})
     expect(page.locator("#alarm")).to_be_hidden()
     told.answer = {"json": {}}
@@ -590,6 +643,7 @@ def stream(browser, address):
     # The program has started again: its counters begin anew, and its first image has the number of an earlier one.
     told.message["image"] = packed([1000.0 * (at < 512) for at in range(1024)])
     told.message["state"]["frames"] = {"received": 1, "lost": 0, "corrupt": 0, "late": 0}
+    told.message["state"]["run_frames"] = {"received": 1, "lost": 0, "corrupt": 0, "late": 0}
     told.tell(
         camera={"phase": "measuring", "leds": "on"},
         light={"allowed": True},
@@ -598,7 +652,7 @@ def stream(browser, address):
     )
     told.has("line", "measuring")
     told.has("leds", "LEDs on")
-    told.has("losses", "1 received, 0 lost, 0 corrupt, 0 late")
+    told.has("losses", "this run: 1 received, 0 lost, 0 corrupt, 0 late")
     assert page.locator("#events li").all_text_contents() == ["00:00:00again"]
     assert [row[2] for row in rows(page, "account")] == [""] * 5, rows(page, "account")
     assert levels(page, "image") == [255] * 512 + [0] * 512

@@ -132,6 +132,7 @@ def fault(browser, address):
     state["camera"]["identity"] |= {"board": hostile, "serial": hostile}
     state["light"]["allowed"] = False
     state["frames"]["lost"] = 7
+    state["run_frames"]["lost"] = 2
     state["overload"] |= {"show_every": 8, "enhancement_off": True, "line": f"the page shows every 8th image {hostile}"}
     state["events"] = [{"unix_ms": 0, "text": f"<b>not markup</b> {hostile}"}]
     message = json.dumps({"state": state, "image": None, "enhanced": None})
@@ -142,7 +143,7 @@ def fault(browser, address):
         wishes.append(route.request.url) if route.request.method == "POST" else None, route.fulfill(json={})))
     page.goto(address)
     expect(page.locator("#account .loss")).to_have_text("7")
-    expect(page.locator("#losses")).to_contain_text("7 lost, 0 corrupt")
+    expect(page.locator("#losses")).to_contain_text("2 lost, 0 corrupt")
     expect(page.locator("#overload")).to_contain_text("the page shows every 8th image <img")
     expect(page.locator("#no-enhanced")).to_have_text("off: this computer is too slow")
     expect(page.locator("#events")).to_contain_text("<b>not markup</b>")

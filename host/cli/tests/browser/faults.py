@@ -61,9 +61,9 @@ FAULTS = [
     ("images on this page are counted per millisecond", "display.js", "1000 * drawn", "drawn", "pictures"),
     (
         "the row of late frames has the corrupt ones",
-        "facts.js",
-        '["late", whole(account.late)',
-        '["late", whole(account.corrupt)',
+        "account.js",
+        '["late", whole(counted.late)',
+        '["late", whole(counted.corrupt)',
         "facts",
     ),
     (
@@ -197,10 +197,15 @@ FAULTS = [
     (
         "the saved sheet exchanges lost and corrupt frames",
         "save.js",
-        "${account.lost} lost, ${account.corrupt} corrupt",
-        "${account.corrupt} lost, ${account.lost} corrupt",
+        "${run.lost} lost, ${run.corrupt} corrupt",
+        "${run.corrupt} lost, ${run.lost} corrupt",
         "pictures",
     ),
+    ("a saved sheet has the time of saving", "save.js", "new Date(picture.arrived_unix_ms)", "new Date()", "pictures"),
+    ("a saved sheet has no warnings", "save.js", "...picture.warnings", "...[]", "pictures"),
+    ("the header has the losses of all runs", "facts.js", "run_frames: run", "frames: run", "facts"),
+    ("counting from 0 forgets images", "account.js", "less(images, zero?.images)", "images", "facts"),
+    ("a program that starts again shows fewer frames than none", "account.js", "frames.received < zero.frames.received", "false", "facts"),
     (
         "numbers of a saved array are big-endian",
         "save.js",

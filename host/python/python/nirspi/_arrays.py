@@ -11,7 +11,10 @@ from ._nirspi import Error
 
 
 def array_of(values: Any, name: str) -> np.ndarray:
-    """An array of anything. What has DLPack and no other way into NumPy is taken by DLPack."""
+    """An array of anything. What is masked was not read, so it is NaN. What has DLPack and no other way
+    into NumPy is taken by DLPack."""
+    if isinstance(values, np.ma.MaskedArray):
+        return _unmasked(values)
     others = ("__array__", "__array_interface__", "__array_struct__", "__buffer__")
     if hasattr(values, "__dlpack__") and not any(hasattr(values, other) for other in others):
         try:
@@ -22,6 +25,13 @@ def array_of(values: Any, name: str) -> np.ndarray:
         return np.asarray(values)
     except (ValueError, TypeError) as error:
         raise Error(f"{name} is no array: {error}") from None
+
+
+def _unmasked(values: np.ma.MaskedArray) -> np.ndarray:
+    """The array with NaN in masked places. One without masked places keeps its type."""
+    if not np.ma.is_masked(values) or values.dtype.kind not in "biufc":
+        return np.ma.getdata(values)
+    return values.astype(np.result_type(values.dtype, np.float32)).filled(np.nan)
 
 
 def real(values: Any, name: str) -> np.ndarray:

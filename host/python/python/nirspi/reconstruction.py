@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
 import itertools
 import json
 import os
@@ -39,6 +41,13 @@ def bases() -> list[str]:
     ['pixel', 'dct', 'haar', 'daubechies4']
     """
     return _nirspi.bases()
+
+
+def _meant(name: str) -> str:
+    """The argument with nearly this name."""
+    known = {*inspect.signature(reconstruct).parameters, *_OF_FILES} - {"source"}
+    near = difflib.get_close_matches(name, known, n=1)
+    return f", expected {near[0]}" if near else ""
 
 
 def reconstruct(
@@ -143,10 +152,11 @@ def reconstruct(
     if not dark and matrix is None:
         raise Error("dark belongs to a matrix")
     is_path = isinstance(measurement, (str, os.PathLike))
-    unknown = ", ".join(name for name in source if not is_path or name not in _OF_FILES)
-    if unknown:
-        what = "an unexpected keyword argument" if is_path else "an argument that needs the path of a file"
-        raise TypeError(f"reconstruct() got {what}: {unknown}")
+    for name in source:
+        if name not in _OF_FILES:
+            raise TypeError(f"reconstruct() got an unexpected keyword argument: {name}{_meant(name)}")
+        if not is_path:
+            raise TypeError(f"reconstruct() got an argument that needs the path of a file: {name}")
     if isinstance(measurement, (str, os.PathLike)):
         if index == "all" and matrix is None and dictionary is None:
             images = _while_reading(measurement, source, options)

@@ -15,6 +15,9 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// The ending of the file's name.
+const ENDING: &str = "flat.json";
+
 /// A flat field in its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KeptFlatField {
@@ -100,12 +103,13 @@ impl KeptFlatField {
         text
     }
 
-    /// Writes the file, whole or not at all.
+    /// Keeps the flat field in a file, whole or not at all: in the camera's own, or in the `named` one. A
+    /// flat field of the same camera there is replaced. Returns the path.
     ///
     /// # Errors
-    /// If the folder cannot be made, or the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), KeptFileError> {
-        Kept::FlatField.write(path, self)
+    /// If the named file holds anything else, the folder cannot be made, or the file cannot be written.
+    pub fn keep(&self, named: Option<&Path>) -> Result<PathBuf, KeptFileError> {
+        Kept::FlatField.keep::<Kind>(named, &self.camera, ENDING, self)
     }
 
     /// Reads the file for use with `camera`.
@@ -140,6 +144,6 @@ impl KeptFlatField {
 ///
 /// # Errors
 /// If the user has no home directory.
-pub fn flat_field_path_of(serial: &str) -> Result<PathBuf, KeptFileError> {
-    path_with(serial, "flat.json")
+fn flat_field_path_of(serial: &str) -> Result<PathBuf, KeptFileError> {
+    path_with(serial, ENDING)
 }

@@ -19,7 +19,7 @@
 mod kept;
 mod measure;
 
-pub use kept::{KeptFlatField, flat_field_path_of};
+pub use kept::KeptFlatField;
 pub use measure::{FlatFieldError, Measured, Sweeps, measure_dark, measure_flat_field};
 
 use nirspi_recon::{Image, Side};

@@ -88,7 +88,7 @@ fn kept() -> KeptFlatField {
 fn a_flat_field_comes_back_as_it_was_and_names_dead_leds() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("made/a.flat.json");
-    kept().write(&path).unwrap();
+    kept().keep(Some(&path)).unwrap();
     let back = KeptFlatField::read(&path, &camera("A 1")).unwrap();
     assert_eq!(back, kept());
     let summary = back.summary();
@@ -108,7 +108,7 @@ fn an_old_or_foreign_flat_field_is_refused_in_one_line() {
         assert_eq!(line.lines().count(), 1, "{line}");
         line
     };
-    kept().write(&path).unwrap();
+    kept().keep(Some(&path)).unwrap();
     assert!(refused(&camera("B2")).contains("serial number A 1, this camera has B2"));
     let other = CameraIdentity { board: "nucleo".into(), ..camera("A 1") };
     assert!(refused(&other).contains("board virtual, this camera has nucleo"));

@@ -1,21 +1,15 @@
-// The account, the rates, the estimates, the camera and the events, in words.
+// The losses of the run, the rates, the estimates, the camera and the events, in words.
 
 import { $, fixed, foreign, list, rate, text, whole } from "./dom.js";
+import * as account from "./account.js";
 import { answer } from "./requests.js";
 
 export function show(state, drawnPerSecond) {
-  const { camera, frames: account, images, picture } = state, found = picture?.enhancement;
-  text($("losses"), `${whole(account.received)} received, ${whole(account.lost)} lost, ${whole(account.corrupt)} corrupt, `
-    + `${whole(account.late)} late`);
-  $("losses").className = account.lost + account.corrupt + account.late > 0 ? "loss" : "";
-  list($("account"), [
-    ["received", whole(account.received)],
-    ["lost", whole(account.lost), account.lost > 0],
-    ["corrupt", whole(account.corrupt), account.corrupt > 0],
-    ["late", whole(account.late), account.late > 0],
-    ["shown", `${whole(images.shown)} of ${whole(account.received)}`],
-    ...(images.failed ? [["frames without an image", whole(images.failed), true]] : []),
-  ]);
+  const { camera, run_frames: run, picture } = state, found = picture?.enhancement;
+  text($("losses"), `this run: ${whole(run.received)} received, ${whole(run.lost)} lost, ${whole(run.corrupt)} corrupt, `
+    + `${whole(run.late)} late`);
+  $("losses").className = run.lost + run.corrupt + run.late > 0 ? "loss" : "";
+  account.show(state);
   list($("rates"), [
     ["frames from the camera", rate(state.rates.camera_frames_per_s)],
     ["images reconstructed", rate(state.rates.images_per_s)],

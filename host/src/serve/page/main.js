@@ -1,5 +1,6 @@
 // Connects to the camera's program, and hands each state to the parts of the page.
 
+import { onReset } from "./account.js";
 import { FRESH_MS, since, watch, words } from "./age.js";
 import { GONE, listen } from "./connection.js";
 import * as controls from "./controls.js";
@@ -75,5 +76,6 @@ function gone(line = GONE.line) {
   look();
 }
 onGone.call = gone;
+onReset.call = plots.forgetLosses;
 watch(() => { if (at !== null) look(); });
 listen(show, gone);

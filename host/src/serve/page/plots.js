@@ -26,6 +26,20 @@ for (const plot of PLOTS) {
   $("plots").append(figure);
 }
 
+// The value at the top of a plot. It fits nearly all values where the largest are far above them, so that one bad second does not
+// flatten two minutes.
+const USUAL = .95, FAR_ABOVE = 3;
+function top(known) {
+  const sorted = [...known].sort((a, b) => a - b), last = sorted.length - 1;
+  const usual = sorted[Math.round(USUAL * last)], largest = sorted[last];
+  return usual > 0 && largest > FAR_ABOVE * usual ? usual : largest;
+}
+
+// A person counts from 0.
+export function forgetLosses() {
+  for (const plot of PLOTS) if (plot.bars) plot.points.fill(NaN);
+}
+
 let before = null;
 function lossesSinceLast({ frames }) {
   const total = frames.lost + frames.corrupt + frames.late, more = before === null ? 0 : Math.max(0, total - before);
@@ -38,9 +52,9 @@ function draw(plot, style) {
   const scale = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
   canvas.width = width * scale;
   canvas.height = height * scale;
-  const pen = canvas.getContext("2d"), top = Math.max(...known, 1e-9) * 1.1;
+  const pen = canvas.getContext("2d"), largest = Math.max(...known), most = Math.max(top(known) ?? 0, 1e-9), limit = most * 1.1;
   pen.scale(scale, scale);
-  const x = at => width - (points.length - 1 - at) * width / (KEPT - 1), y = value => height - 1 - value / top * (height - 12);
+  const x = at => width - (points.length - 1 - at) * width / (KEPT - 1), y = value => height - 1 - Math.min(value / limit, 1) * (height - 12);
   pen.strokeStyle = style.getPropertyValue("--line");
   pen.strokeRect(.5, .5, width - 1, height - 1);
   pen.strokeStyle = pen.fillStyle = style.getPropertyValue(plot.bars ? "--bad" : "--accent");
@@ -56,11 +70,11 @@ function draw(plot, style) {
   pen.stroke();
   pen.fillStyle = style.getPropertyValue("--soft");
   pen.font = "10px system-ui, sans-serif";
-  if (known.length) pen.fillText(plot.words(Math.max(...known)), 4, 11);
+  if (known.length) pen.fillText(plot.words(most) + (largest > limit ? `, at most ${plot.words(largest)}` : ""), 4, 11);
   const last = points.at(-1), says = Number.isFinite(last) ? plot.words(last) : "–";
   text(plot.now, says);
   canvas.setAttribute("aria-label", known.length
-    ? `${plot.name}: now ${says}, between ${plot.words(Math.min(...known))} and ${plot.words(Math.max(...known))} in the last `
+    ? `${plot.name}: now ${says}, between ${plot.words(Math.min(...known))} and ${plot.words(largest)} in the last `
       + `${Math.round(points.length * EVERY_MS / 1000)} s` : `${plot.name}: nothing yet`);
 }
 

@@ -2,27 +2,50 @@
 
 import { $, fixed, foreign, frames } from "./dom.js";
 
+// What a picture is, for whoever finds it later: the picture's own time, measurement, losses and warnings, not those of the moment
+// at which it is saved.
+function about({ camera, picture, scene }) {
+  const { run_frames: run, enhancement: found } = picture;
+  const is = camera.simulated ? "simulated; " : "", at = new Date(picture.arrived_unix_ms).toISOString();
+  const before = scene ? `, scene ${foreign(scene.name)}, ${fixed(scene.distance_m, 2)} m, ${foreign(scene.weather)}` : "";
+  const recursive = picture.past === null ? "" : ", recursive";
+  return [
+    `${is}${foreign(camera.identity.board)} ${foreign(camera.identity.serial)}, ${at}${before}`,
+    `${foreign(picture.order)} order, ${picture.patterns} of 1024 patterns, sweeps in a frame: ${picture.sweeps}, ${frames(picture.frames)}`,
+    `${picture.method}${recursive}, white ${fixed(picture.white_counts, 1)} ADC counts` + (found
+      ? `; enlarged and deblurred: blur ${fixed(found.blur_px, 2)} px, noise ${fixed(found.noise, 3)} of white` : ""),
+    `this run: ${run.received} received, ${run.lost} lost, ${run.corrupt} corrupt, ${run.late} late`,
+    ...picture.warnings.map(warning => `warning: ${foreign(warning)}`),
+  ];
+}
+
+// The line in parts that fit.
+function wrapped(pen, line, width) {
+  const parts = [];
+  for (const word of line.split(" ")) {
+    const longer = parts.length ? `${parts.at(-1)} ${word}` : word;
+    if (parts.length && pen.measureText(longer).width <= width) parts[parts.length - 1] = longer;
+    else parts.push(word);
+  }
+  return parts;
+}
+
 export function sheet({ state, enhanced }) {
-  const side = 512, gap = 16, foot = 84;
+  const side = 512, gap = 16, step = 22, font = "15px system-ui, sans-serif";
   const panels = enhanced ? [$("image"), $("enhanced")] : [$("image")];
   const sheet = document.createElement("canvas"), pen = sheet.getContext("2d");
   sheet.width = gap + panels.length * (side + gap);
-  sheet.height = gap + side + foot;
+  pen.font = font;
+  const lines = about(state).flatMap(line => wrapped(pen, line, sheet.width - 2 * gap));
+  // A canvas of another size begins anew.
+  sheet.height = gap + side + gap + step * lines.length + gap;
   pen.fillStyle = "#fff";
   pen.fillRect(0, 0, sheet.width, sheet.height);
   pen.imageSmoothingEnabled = false;
   panels.forEach((panel, at) => pen.drawImage(panel, gap + at * (side + gap), gap, side, side));
   pen.fillStyle = "#222";
-  pen.font = "15px system-ui, sans-serif";
-  const { camera, frames: account, picture } = state, found = picture.enhancement;
-  const lines = [
-    `${camera.simulated ? "simulated; " : ""}${foreign(camera.identity.board)} ${foreign(camera.identity.serial)}, `
-      + new Date().toISOString(),
-    `${picture.method}, ${frames(picture.frames)}, white ${fixed(picture.white_counts, 1)} ADC counts` + (found
-      ? `; enlarged and deblurred: blur ${fixed(found.blur_px, 2)} px, noise ${fixed(found.noise, 3)} of white` : ""),
-    `${account.received} received, ${account.lost} lost, ${account.corrupt} corrupt, ${account.late} late`,
-  ];
-  lines.forEach((line, at) => pen.fillText(line, gap, gap + side + 24 + 22 * at, sheet.width - 2 * gap));
+  pen.font = font;
+  lines.forEach((line, at) => pen.fillText(line, gap, gap + side + 24 + step * at, sheet.width - 2 * gap));
   return sheet;
 }
 

@@ -105,7 +105,7 @@ fn calibrations(bytes: &[u8]) {
         }
     }
     let path = place::path("again.json");
-    kept.write(&path).expect("its file");
+    kept.keep(Some(&path)).expect("its file");
     assert_eq!(KeptCalibration::read(&path, camera).expect("our own file"), kept);
 }
 
@@ -135,7 +135,7 @@ fn flat_fields(bytes: &[u8]) {
     let corrected = kept.flat.correct(&image);
     assert!(corrected.pixels().iter().all(|pixel| pixel.is_finite()), "a pixel that is no number");
     let path = place::path("again.flat.json");
-    kept.write(&path).expect("its file");
+    kept.keep(Some(&path)).expect("its file");
     assert_eq!(KeptFlatField::read(&path, camera).expect("our own file"), kept);
 }
 
