@@ -169,7 +169,7 @@ fn calibrations() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("kept.json");
     let kept = KeptCalibration::new(camera.clone(), settling, Vec::new(), std::time::UNIX_EPOCH);
-    kept.write(&path).unwrap();
+    kept.keep(Some(&path)).unwrap();
     survives("a.json", &std::fs::read(&path).unwrap(), &|path| {
         told(KeptCalibration::read(path, &camera))
     });

@@ -2,17 +2,19 @@
 
 use super::{Usage, print};
 use anyhow::Result;
-use nirspi::udev::{Installed, RULE_NAME, RULES_DIR, RuleError, check, install, uninstall};
+use nirspi::udev::{Group, Installed, RULE_NAME, RULES_DIR, RuleError, check, install, uninstall};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 
 /// Let this machine's users use cameras on USB
 ///
-/// On Linux this installs a udev rule, once, and needs root. Nothing has to be done on other systems.
+/// On Linux this installs a udev rule, once, and needs root. The rule lets the user at the machine open the camera; --group
+/// lets a group of users open it too, over SSH and in services. Nothing has to be done on other systems.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi setup --check\n\
-    \x20 sudo nirspi setup")]
+    \x20 sudo nirspi setup\n\
+    \x20 sudo nirspi setup --group plugdev")]
 pub struct Args {
     /// Only say whether the rule is installed; exit code 1 if not
     #[arg(long)]
@@ -20,6 +22,9 @@ pub struct Args {
     /// Remove the rule
     #[arg(long, conflicts_with = "check")]
     uninstall: bool,
+    /// Let the users of this group open the camera too [default: the group of the rule that is there]
+    #[arg(long, value_name = "GROUP", conflicts_with_all = ["check", "uninstall"])]
+    group: Option<Group>,
     /// Where udev rules lie
     #[arg(long, value_name = "DIR", default_value = RULES_DIR)]
     rules_dir: PathBuf,
@@ -52,7 +57,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let (changed, said) = if args.uninstall {
         (uninstall(folder).map_err(explain)?, ["removed", "was not there"])
     } else {
-        (install(folder).map_err(explain)?, ["installed", "was installed already"])
+        if let Some(group) = &args.group {
+            group.check().map_err(|error| Usage(format!("--group: {error}")))?;
+        }
+        (
+            install(folder, args.group.as_ref()).map_err(explain)?,
+            ["installed", "was installed already"],
+        )
     };
     print::line(format_args!("{path} {}", said[usize::from(!changed)]))?;
     if changed && folder == Path::new(RULES_DIR) && !reload() {

@@ -16,9 +16,12 @@ fn the_virtual_camera_is_of_this_version_and_needs_nothing() {
         (&true.into(), &true.into())
     );
 
-    let said = bench.run(&["info"]).succeeded().stdout;
+    let said = bench.run(&["info", "--camera", "virtual"]).succeeded().stdout;
     assert!(said.starts_with("virtual virtual-1\n") && said.contains("interlock closed"), "{said}");
     assert_eq!(said.matches("as expected").count(), 4, "{said}");
+    // Without a name, a note says which camera it is.
+    let note = "note: no camera on USB: this is the virtual one\n";
+    assert_eq!(bench.run(&["info"]).succeeded().stdout.replace(note, ""), said);
 }
 
 #[test]
@@ -40,6 +43,14 @@ fn the_udev_rule_is_installed_checked_and_removed() {
     setup(&[]).succeeded();
     setup(&["--check"]).succeeded();
     assert!(bench.path("rules.d/60-nirspi.rules").exists());
+    setup(&["--group", "root"]).succeeded();
+    let rule = std::fs::read_to_string(bench.path("rules.d/60-nirspi.rules")).unwrap();
+    assert!(rule.contains("GROUP=\"root\""), "{rule}");
+    setup(&["--check"]).succeeded();
+    setup(&["--group", "a b"]).failed(2, &["--group", "no name of a group"]);
+    if std::path::Path::new("/usr/bin/getent").exists() {
+        setup(&["--group", "no-such-group-here"]).failed(2, &["no group no-such-group-here"]);
+    }
     setup(&["--uninstall"]).succeeded();
     assert_eq!(setup(&["--check"]).code, Some(1));
 }
