@@ -11,7 +11,6 @@
 //! a gap of `g` frames with `d` damaged packets in it, `min(g, d)` are corrupt and the rest are
 //! lost.
 
-use nirspi_wire::PacketError;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -93,17 +92,6 @@ pub enum Check {
 }
 
 impl Check {
-    /// The check that this packet failed; `None` for an intact message of a newer version.
-    #[must_use]
-    pub fn of(error: PacketError) -> Option<Self> {
-        match error {
-            PacketError::Message => None,
-            PacketError::BufferTooSmall | PacketError::TooLong => Some(Self::Length),
-            PacketError::Cobs => Some(Self::Cobs),
-            PacketError::Crc => Some(Self::Crc),
-        }
-    }
-
     /// What is wrong with such a packet.
     #[must_use]
     pub fn in_words(self) -> &'static str {

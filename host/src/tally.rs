@@ -87,10 +87,12 @@ impl Tally {
                 _ => {}
             },
             Ok(_) => {}
-            Err(error) => match Check::of(*error) {
-                Some(check) => self.account.damaged(check),
-                None => self.unknown += 1,
-            },
+            Err(PacketError::Message) => self.unknown += 1,
+            Err(PacketError::BufferTooSmall | PacketError::TooLong) => {
+                self.account.damaged(Check::Length);
+            }
+            Err(PacketError::Cobs) => self.account.damaged(Check::Cobs),
+            Err(PacketError::Crc) => self.account.damaged(Check::Crc),
         }
         false
     }
