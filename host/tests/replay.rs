@@ -113,6 +113,22 @@ fn packets(path: &Path) -> Vec<Vec<u8>> {
     all.filter(|bytes| !is_reply(bytes)).collect()
 }
 
+/// Another reader of MCAP finds each channel's messages numbered from 0 on, and in the order of their times.
+#[test]
+fn the_messages_of_each_channel_are_numbered() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = std::fs::read(recorded(folder.path(), true)).unwrap();
+    let mut seen = std::collections::BTreeMap::<String, (u32, u64)>::new();
+    for message in mcap::MessageStream::new(&file).unwrap() {
+        let message = message.unwrap();
+        let (next, time) = seen.entry(message.channel.topic.clone()).or_default();
+        assert_eq!(message.sequence, *next, "{}", message.channel.topic);
+        assert!(message.log_time >= *time, "{}", message.channel.topic);
+        (*next, *time) = (*next + 1, message.log_time);
+    }
+    assert!(seen.values().any(|(messages, _)| *messages > FRAMES), "{seen:?}");
+}
+
 #[test]
 fn a_capture_of_a_replay_has_the_packets_of_the_recording() {
     let folder = tempfile::tempdir().unwrap();

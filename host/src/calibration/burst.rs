@@ -362,6 +362,22 @@ mod tests {
     }
 
     #[test]
+    fn the_unsettled_first_period_of_each_burst_does_not_count() {
+        let one = burst(7, 9000.0, 0.8);
+        let samples = [&one[..], &one[..]].concat();
+        let mut unsettled = samples.clone();
+        for burst in unsettled.chunks_exact_mut(usize::from(RAW_SAMPLES_MAX)) {
+            burst[..2 * usize::from(HALF_PERIOD)].fill(16_000.0);
+        }
+        assert_eq!(evaluate(&unsettled).unwrap(), evaluate(&samples).unwrap());
+        let known = evaluate(&samples).unwrap();
+        assert_eq!(known.at_levels_of(&unsettled), known.at_levels_of(&samples));
+        // The second period counts.
+        unsettled[2 * usize::from(HALF_PERIOD)] += 1000.0;
+        assert_ne!(evaluate(&unsettled).unwrap(), evaluate(&samples).unwrap());
+    }
+
+    #[test]
     fn the_taps_share_out_all_of_the_light() {
         let settling = evaluate(&burst(5, 9000.0, 0.5)).unwrap();
         let leak = settling.leak(5, 2).unwrap();

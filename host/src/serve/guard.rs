@@ -136,9 +136,22 @@ mod tests {
     #[test]
     fn foreign_pages_are_refused() {
         let host = ("host", "127.0.0.1:8080");
-        for origin in
-            ["http://evil.example", "null", "https://127.0.0.1:8080", "http://127.0.0.1:3000", ""]
-        {
+        for origin in [
+            "http://evil.example",
+            "null",
+            "https://127.0.0.1:8080",
+            "http://127.0.0.1:3000",
+            "",
+            // The nearest wrong ones.
+            "http://127.0.0.1:80800",
+            "http://127.0.0.1:808",
+            "http://127.0.0.1",
+            "http://127.0.0.1:8080.evil.example",
+            "http://127.0.0.1:8080@evil.example",
+            "http://127.0.0.1:8080/",
+            "http://x127.0.0.1:8080",
+            "127.0.0.1:8080",
+        ] {
             let asked = asked("127.0.0.1:8080", &[host, ("origin", origin)]);
             assert_eq!(asked, Err(Refused::Origin), "{origin}");
         }

@@ -326,8 +326,12 @@ mod tests {
         let fog = air("fog:0.5");
         assert!((fog.drops().liquid_water_g_per_m3() / 0.5 - 1.0).abs() < 1e-9);
         for text in ["fog:5m", "smoke:5m", "dust:5m", "dust:5m,3,1.5,0"] {
-            let seen = air(text).weather(550.0).unwrap().medium().visibility_m();
+            let weather = air(text).weather(550.0).unwrap();
+            let seen = weather.medium().visibility_m();
             assert!((seen / 5.0 - 1.0).abs() < 1e-9, "{text}: {seen}");
+            // Koschmieder's visibility: the contrast of a black object has fallen to 2 %.
+            let contrast = weather.medium().transmission(5.0);
+            assert!((contrast / 0.02 - 1.0).abs() < 1e-3, "{text}: {contrast}");
         }
     }
 
