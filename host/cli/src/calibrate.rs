@@ -101,8 +101,10 @@ impl FlatFieldReport {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    // A mistake is said before any light.
+    let (setup, sweeps) = (setup(args)?, sweeps(args)?);
     if args.dark {
-        return run_dark(args);
+        return run_dark(args, setup, sweeps);
     }
     let address = args.camera.address(args.report.json)?;
     let mut session = address::open(&address, &SceneArgs::white_sheet(&args.model, args.seed))?;
@@ -112,7 +114,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let kept = KeptCalibration::new(camera, settling, Vec::new(), SystemTime::now());
     let flat_field = match args.white {
         true => {
-            let measured = white(args, &mut session, &kept.settling);
+            let measured = white(setup, sweeps, &mut session, &kept.settling);
             Some(measured.with_context(|| format!("{address}: no flat field"))?)
         }
         false => None,
@@ -144,17 +146,16 @@ fn say(report: &Report, flat_field: Option<impl std::fmt::Display>) -> Result<()
 }
 
 /// All patterns and their complements, with the timing of the camera.
-fn setup(args: &Args, settling: &Settling) -> Result<MeasurementSetup> {
+fn setup(args: &Args) -> Result<MeasurementSetup> {
     let readout = args.model.read()?.readout;
-    let setup = MeasurementSetup::new(&Order::Natural, 1.0)?
-        .timed(readout.clocks_per_pattern, readout.blanked);
-    Ok(MeasurementSetup { adc_latency: settling.adc_latency, ..setup })
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0)?;
+    Ok(setup.timed(readout.clocks_per_pattern, readout.blanked))
 }
 
 /// The number of sweeps to sum: --sweeps, or those that --light takes.
-fn sweeps(args: &Args, setup: &MeasurementSetup) -> Result<u32> {
+fn sweeps(args: &Args) -> Result<u32> {
     let Some(light) = args.light else { return Ok(args.sweeps) };
-    let sweeps = exposure(Length::Light(light, Some(1)), setup)?.frames;
+    let sweeps = exposure(Length::Light(light, Some(1)), &setup(args)?)?.frames;
     if (8..=10_000_000).contains(&sweeps) {
         return Ok(sweeps);
     }
@@ -163,12 +164,13 @@ fn sweeps(args: &Args, setup: &MeasurementSetup) -> Result<u32> {
 
 /// Measures the flat field and writes its file.
 fn white(
-    args: &Args,
+    setup: MeasurementSetup,
+    sweeps: u32,
     session: &mut Session,
     settling: &Settling,
 ) -> Result<(KeptFlatField, PathBuf)> {
-    let setup = setup(args, settling)?;
-    let sweeps = Sweeps::of_map(sweeps(args, &setup)?);
+    let setup = MeasurementSetup { adc_latency: settling.adc_latency, ..setup };
+    let sweeps = Sweeps::of_map(sweeps);
     let bar = Progress::of("flat field", sweeps.map + 2 * sweeps.check, "sweeps");
     let measured = measure_flat_field(session, &setup, settling, sweeps, &mut bar.watch());
     drop(bar);
@@ -179,7 +181,7 @@ fn white(
 }
 
 /// Adds a dark frame to the flat field that is kept.
-fn run_dark(args: &Args) -> Result<ExitCode> {
+fn run_dark(args: &Args, setup: MeasurementSetup, sweeps: u32) -> Result<ExitCode> {
     let address = args.camera.address(args.report.json)?;
     let mut session = address::open(&address, &SceneArgs::covered(&args.model, args.seed))?;
     let camera = session.identity().clone();
@@ -188,8 +190,8 @@ fn run_dark(args: &Args) -> Result<ExitCode> {
         anyhow!("no flat field is kept for camera {serial}: run nirspi calibrate --white first")
     })?;
     let settling = KeptCalibration::read(&path_of(&camera.serial)?, &camera)?.settling;
-    let setup = setup(args, &settling)?;
-    let (flat, sweeps) = (kept.flat.clone(), sweeps(args, &setup)?);
+    let setup = MeasurementSetup { adc_latency: settling.adc_latency, ..setup };
+    let flat = kept.flat.clone();
     let bar = Progress::of("dark frame", 2 * u64::from(sweeps), "sweeps");
     let flat = measure_dark(&mut session, &setup, &settling, flat, sweeps, &mut bar.watch());
     drop(bar);

@@ -49,10 +49,16 @@ impl CameraArgs {
     /// names the camera.
     pub fn address(&self, json: bool) -> Result<CameraAddress> {
         let (address, because) = self.meant()?;
-        if let (Some(because), false) = (because, json) {
-            print::note(because)?;
-        }
+        say(because, json)?;
         Ok(address)
+    }
+}
+
+/// Says which camera is meant.
+pub fn say(because: Option<String>, json: bool) -> Result<()> {
+    match because {
+        Some(because) if !json => print::note(because),
+        _ => Ok(()),
     }
 }
 

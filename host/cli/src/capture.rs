@@ -1,7 +1,7 @@
 //! `nirspi capture`: records a camera, with an account of every frame.
 
 use super::calibration::CalibrationArgs;
-use super::camera::{CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
+use super::camera::{self, CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
 use super::report::ReportArgs;
 use super::{Usage, address, print, progress, provenance};
 use anyhow::Result;
@@ -80,8 +80,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let target = target(args)?;
     let seconds = args.seconds;
     let stop = interrupt::stop_flag();
-    let mut session = address::open(&args.camera.address(args.report.json)?, &args.scene)?;
+    let (address, because) = args.camera.meant()?;
+    let mut session = address::open(&address, &args.scene)?;
     let choice = args.calibration.choose(&setup, session.identity())?;
+    camera::say(because, args.report.json)?;
     let options = CaptureOptions {
         setup,
         frames,

@@ -1,7 +1,7 @@
 //! `nirspi serve`: a camera live on a web page.
 
 use super::calibration::CalibrationArgs;
-use super::camera::{CameraArgs, SceneArgs, SetupArgs};
+use super::camera::{self, CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
 use super::provenance::made;
 use super::{Usage, address, print};
@@ -126,10 +126,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let session = address::open(&address, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
     print::line(server.invitation(&address))?;
-    if let Some(because) = because {
-        print::note(because)?;
-    }
-    let camera = CameraSource {
+    camera::say(because, false)?;
+    let source = CameraSource {
         address: address.to_string(),
         setup: setup.clone(),
         model: args.scene.model.read()?,
@@ -137,7 +135,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         record_to: args.record_to.clone(),
         connect: connect(args, address, setup),
     };
-    let served = serve(server, camera, connected, imaging, settings, &stop)?;
+    let served = serve(server, source, connected, imaging, settings, &stop)?;
     print::line(format_args!("stopped: {served}"))?;
     Ok(ExitCode::SUCCESS)
 }
