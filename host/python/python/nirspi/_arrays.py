@@ -31,7 +31,7 @@ def _unmasked(values: np.ma.MaskedArray) -> np.ndarray:
     """The array with NaN in masked places. One without masked places keeps its type."""
     if not np.ma.is_masked(values) or values.dtype.kind not in "biufc":
         return np.ma.getdata(values)
-    return values.astype(np.result_type(values.dtype, np.float32)).filled(np.nan)
+    return np.where(np.ma.getmaskarray(values), np.nan, np.ma.getdata(values))
 
 
 def real(values: Any, name: str) -> np.ndarray:
