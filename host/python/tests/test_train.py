@@ -454,6 +454,9 @@ def test_what_cannot_be_trained_is_named_and_leaves_nothing(tmp_path, capsys):
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_signal_that_ends_a_run_keeps_it_and_it_goes_on(name, tmp_path, monkeypatch):
     number = getattr(signal, name)
+    # A test run under nohup ignores SIGHUP, and what is ignored stays so.
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, signal.SIG_DFL)
     once, before = Run.once, signal.getsignal(number)
 
     def interrupted(self):
