@@ -55,43 +55,46 @@ impl fmt::Display for Device {
     }
 }
 
-/// The camera that is meant where none is named, and what a user should know of it.
+/// The camera of a user who names no camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Meant {
+pub struct DefaultCamera {
     /// Its address.
     pub address: CameraAddress,
-    /// Why it is the one, in one line.
-    pub because: String,
+    /// Which camera it is, in one line for the user.
+    pub note: String,
 }
 
-/// Several cameras are there, and none was named.
+/// The user names no camera, and several cameras are on USB.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{} cameras on USB ({}), expected one, or an address", .0.len(), .0.join(", "))]
+#[error("{} cameras are on USB ({}), expected the address of one of them", .0.len(), .0.join(", "))]
 pub struct SeveralCameras(Vec<String>);
 
-/// The camera that is meant where none is named: the one on USB, or the virtual one if there is none.
+/// The camera of a user who names no camera: the camera on USB, or the virtual camera if USB has no camera.
 ///
 /// # Errors
-/// [`SeveralCameras`] if there are several on USB.
-pub fn meant() -> Result<Meant, SeveralCameras> {
-    of_those_on_usb(usb::usb_cameras())
+/// [`SeveralCameras`] if USB has several.
+pub fn default_camera() -> Result<DefaultCamera, SeveralCameras> {
+    choose(usb::usb_cameras())
 }
 
-fn of_those_on_usb(found: io::Result<Vec<UsbCamera>>) -> Result<Meant, SeveralCameras> {
-    let (address, because) = match found.as_deref() {
-        Ok([]) => (CameraAddress::Virtual, "no camera on USB: this is the virtual one".to_owned()),
-        Ok([camera]) => {
-            (CameraAddress::Usb(camera.serial.clone()), format!("{camera}: the one camera on USB"))
+fn choose(found: io::Result<Vec<UsbCamera>>) -> Result<DefaultCamera, SeveralCameras> {
+    let (address, note) = match found.as_deref() {
+        Ok([]) => {
+            (CameraAddress::Virtual, "no camera found on USB: using the virtual camera".to_owned())
         }
+        Ok([camera]) => (
+            CameraAddress::Usb(camera.serial.clone()),
+            format!("using {camera}, the only camera on USB"),
+        ),
         Ok(several) => {
             return Err(SeveralCameras(several.iter().map(UsbCamera::to_string).collect()));
         }
         Err(error) => {
             let why = in_one_line(error);
-            (CameraAddress::Virtual, format!("USB not listed ({why}): this is the virtual camera"))
+            (CameraAddress::Virtual, format!("cannot list USB ({why}): using the virtual camera"))
         }
     };
-    Ok(Meant { address, because })
+    Ok(DefaultCamera { address, note })
 }
 
 /// The virtual camera of this program, the cameras at these TCP addresses and at the default one,
@@ -175,22 +178,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_one_camera_is_meant_and_several_are_named() {
+    fn the_only_camera_on_usb_is_the_default_and_several_are_listed() {
         let camera =
             |serial: &str| UsbCamera { serial: Some(serial.to_owned()), protocol: Some(4) };
-        let meant = of_those_on_usb(Ok(vec![camera("77")])).unwrap();
-        assert_eq!(meant.address, CameraAddress::Usb(Some("77".to_owned())));
-        assert_eq!(meant.because, "usb:77: the one camera on USB");
-        let several = of_those_on_usb(Ok(vec![camera("77"), camera("78")])).unwrap_err();
-        let words = "2 cameras on USB (usb:77, usb:78), expected one, or an address";
+        let chosen = choose(Ok(vec![camera("77")])).unwrap();
+        assert_eq!(chosen.address, CameraAddress::Usb(Some("77".to_owned())));
+        assert_eq!(chosen.note, "using usb:77, the only camera on USB");
+        let several = choose(Ok(vec![camera("77"), camera("78")])).unwrap_err();
+        let words = "2 cameras are on USB (usb:77, usb:78), expected the address of one of them";
         assert_eq!(several.to_string(), words);
         for (found, words) in [
-            (Ok(Vec::new()), "no camera on USB: this is the virtual one"),
-            (Err(io::Error::other("no rights")), "USB not listed (no rights): this is the virtual"),
+            (Ok(Vec::new()), "no camera found on USB: using the virtual camera"),
+            (Err(io::Error::other("no rights")), "cannot list USB (no rights): using the virtual"),
         ] {
-            let meant = of_those_on_usb(found).unwrap();
-            assert_eq!(meant.address, CameraAddress::Virtual);
-            assert!(meant.because.starts_with(words), "{}", meant.because);
+            let chosen = choose(found).unwrap();
+            assert_eq!(chosen.address, CameraAddress::Virtual);
+            assert!(chosen.note.starts_with(words), "{}", chosen.note);
         }
     }
 }

@@ -25,7 +25,7 @@ const SCENE_PX: usize = 256;
 pub struct CameraArgs {
     /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT, serial:PATH[:BAUD], or replay:REC[,SPEED]: a recording that
     /// is played back with its own setup and calibration, at 1, 0.5, ... times the camera's time or at max speed
-    /// [default: the one camera on USB; virtual if there is none]
+    /// [default: the camera on USB, or virtual without a camera there]
     #[arg(long, value_name = "CAMERA")]
     camera: Option<CameraAddress>,
 }
@@ -36,28 +36,28 @@ impl CameraArgs {
         matches!(self.camera, Some(CameraAddress::Replay(_)))
     }
 
-    /// The camera's address, and which camera that is if none was named.
-    pub fn meant(&self) -> Result<(CameraAddress, Option<String>)> {
+    /// The camera's address, and a note that says which camera it is if the user named no camera.
+    pub fn address_and_note(&self) -> Result<(CameraAddress, Option<String>)> {
         if let Some(address) = &self.camera {
             return Ok((address.clone(), None));
         }
-        let meant = devices::meant().map_err(|several| Usage(format!("--camera: {several}")))?;
-        Ok((meant.address, Some(meant.because)))
+        let default =
+            devices::default_camera().map_err(|several| Usage(format!("--camera: {several}")))?;
+        Ok((default.address, Some(default.note)))
     }
 
-    /// The camera's address. If none was named, a note says which it is, unless the result is JSON, which
-    /// names the camera.
+    /// The camera's address. Prints the note, but for a result in JSON, which names the camera itself.
     pub fn address(&self, json: bool) -> Result<CameraAddress> {
-        let (address, because) = self.meant()?;
-        say(because, json)?;
+        let (address, note) = self.address_and_note()?;
+        say(note, json)?;
         Ok(address)
     }
 }
 
-/// Says which camera is meant.
-pub fn say(because: Option<String>, json: bool) -> Result<()> {
-    match because {
-        Some(because) if !json => print::note(because),
+/// Prints the note of [`CameraArgs::address_and_note`].
+pub fn say(note: Option<String>, json: bool) -> Result<()> {
+    match note {
+        Some(note) if !json => print::note(note),
         _ => Ok(()),
     }
 }

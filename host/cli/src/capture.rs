@@ -80,10 +80,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let target = target(args)?;
     let seconds = args.seconds;
     let stop = interrupt::stop_flag();
-    let (address, because) = args.camera.meant()?;
+    let (address, note) = args.camera.address_and_note()?;
     let mut session = address::open(&address, &args.scene)?;
     let choice = args.calibration.choose(&setup, session.identity())?;
-    camera::say(because, args.report.json)?;
+    camera::say(note, args.report.json)?;
     let options = CaptureOptions {
         setup,
         frames,

@@ -122,11 +122,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         imaging.check_warm_start(settings.method).map_err(refused)?;
     }
     let stop = interrupt::stop_flag();
-    let (address, because) = args.camera.meant()?;
+    let (address, note) = args.camera.address_and_note()?;
     let session = address::open(&address, &args.scene)?;
     let connected = prepared(session, &args.calibration, &setup)?;
     print::line(server.invitation(&address))?;
-    camera::say(because, false)?;
+    camera::say(note, false)?;
     let source = CameraSource {
         address: address.to_string(),
         setup: setup.clone(),

@@ -420,6 +420,10 @@ impl Live {
         };
         self.ended_with(captured.counters);
         self.failed = self.failed + captured.failed_checks;
+        let mut log = lock(&self.shared.camera);
+        let newest_us = log.camera.said.device_time_us;
+        log.counted(newest_us, self.failed);
+        drop(log);
         let missing = captured.missing();
         if let Some(path) = &captured.recording {
             self.recorded(path, captured.counters.received);

@@ -186,7 +186,9 @@ impl CameraLog {
         let before = self.camera.said.failed_checks;
         for check in failed_checks.first_after(before) {
             let wrong = check.in_words();
-            let line = format!("a damaged packet: {wrong}; further ones of this kind are counted");
+            let line = format!(
+                "a packet arrived damaged: {wrong}; the next such packets are only counted"
+            );
             self.event(Level::Warning, line);
         }
         let said = &mut self.camera.said;
@@ -255,8 +257,8 @@ mod tests {
         let texts: Vec<&str> =
             log.events().iter().skip(before).map(|event| event.text.as_str()).collect();
         assert_eq!(texts.len(), 2, "{texts:?}");
-        assert!(texts[0].starts_with("a damaged packet: wrong CRC-32; further ones"));
-        assert!(texts[1].starts_with("a damaged packet: broken COBS code; "));
+        assert!(texts[0].starts_with("a packet arrived damaged: wrong CRC-32; the next"));
+        assert!(texts[1].starts_with("a packet arrived damaged: broken COBS code; "));
         assert_eq!(log.camera.said.failed_checks.packets(), 18);
     }
 

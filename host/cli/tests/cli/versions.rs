@@ -20,7 +20,7 @@ fn the_virtual_camera_is_of_this_version_and_needs_nothing() {
     assert!(said.starts_with("virtual virtual-1\n") && said.contains("interlock closed"), "{said}");
     assert_eq!(said.matches("as expected").count(), 4, "{said}");
     // Without a name, a note says which camera it is.
-    let note = "note: no camera on USB: this is the virtual one\n";
+    let note = "note: no camera found on USB: using the virtual camera\n";
     assert_eq!(bench.run(&["info"]).succeeded().stdout.replace(note, ""), said);
 }
 
