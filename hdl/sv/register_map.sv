@@ -3,7 +3,7 @@ package nirspi_register_map;
     localparam logic [32-1:0] ADDRESS_IDENTITY        = 32'h00000000;
     localparam logic [32-1:0] RESET_IDENTITY          = 32'h4E535049;
     localparam logic [32-1:0] ADDRESS_VERSION         = 32'h00000001;
-    localparam logic [32-1:0] RESET_VERSION           = 32'h00000307;
+    localparam logic [32-1:0] RESET_VERSION           = 32'h00000400;
     localparam logic [32-1:0] ADDRESS_SCRATCH         = 32'h00000002;
     localparam logic [32-1:0] RESET_SCRATCH           = 32'h00000000;
     localparam logic [32-1:0] ADDRESS_CONTROL         = 32'h00000003;

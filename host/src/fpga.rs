@@ -7,9 +7,7 @@
 use crate::session::{Listener, Session, SessionError};
 use crate::versions::of_register;
 use nirspi_wire::ADC_HZ;
-use nirspi_wire::register::{
-    Design, IDENTITY, Register, clocks, has_this_map, sampling, scans_the_phase,
-};
+use nirspi_wire::register::{Design, IDENTITY, Register, clocks, has_this_map, sampling};
 use std::fmt;
 use thiserror::Error;
 
@@ -30,7 +28,7 @@ pub struct Fpga {
 pub enum Sampling {
     /// The FPGA runs the bring-up design.
     NoAdc,
-    /// The FPGA has made no scan: gateware before 0.3.7, or a simulated FPGA.
+    /// The FPGA has made no scan: a simulated FPGA.
     NoScan,
     /// No phase showed the ADC's checkerboard. The clock stays at the phase at which the gateware was built.
     NoPattern,
@@ -214,8 +212,7 @@ impl Fpga {
     /// What the FPGA's scan of the ADC's sampling phase has found.
     #[must_use]
     pub fn sampling(&self) -> Sampling {
-        let version = self.version().unwrap_or_default();
-        let word = self.sampling.filter(|_| scans_the_phase(version)).unwrap_or_default();
+        let word = self.sampling.unwrap_or_default();
         let width_steps = (word & sampling::WIDTH) >> sampling::WIDTH.trailing_zeros();
         let period_steps = (word & sampling::PERIOD) >> sampling::PERIOD.trailing_zeros();
         if self.design.and_then(Design::from_register) == Some(Design::BringUp) {
@@ -299,7 +296,7 @@ mod tests {
             (Fpga { identity: Some(u32::MAX), ..good() }, ["0xffffffff", "DONE"]),
             (Fpga { identity: None, ..good() }, ["0x4e535049", "cs_n"]),
             (Fpga { identity: Some(0x1234), ..good() }, ["0x00001234", "another design"]),
-            (Fpga { version: Some(0x0100), ..good() }, ["0.1.0", "0.3.7"]),
+            (Fpga { version: Some(0x0100), ..good() }, ["0.1.0", "0.4.0"]),
             (Fpga { design: Some(9), ..good() }, ["design 9", "2 (bring-up)"]),
             (Fpga { clocks: Some(0), ..good() }, ["0.00 MHz, PLL not locked", "bring-up gateware"]),
             (Fpga { clocks: Some(8_000), ..good() }, ["80.00 MHz, PLL not locked", "sample clock"]),
@@ -333,9 +330,6 @@ mod tests {
         };
         assert_eq!((width_steps, phase_steps, period_steps), (15, 17, 40));
         assert!((step_ns - 0.2).abs() < 1e-9);
-        // Older gateware has another register there, or none.
-        let older = Fpga { version: Some(0x0306), sampling: Some(word(15, 17)), ..good() };
-        assert_eq!(older.sampling(), Sampling::NoScan);
         let bring_up = Fpga { design: Some(2), ..good() };
         assert_eq!(bring_up.sampling(), Sampling::NoAdc);
     }

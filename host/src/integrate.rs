@@ -227,13 +227,13 @@ pub enum IntegrateError {
 mod tests {
     use super::*;
     use nirspi_recon::Order;
-    use nirspi_wire::samples::Samples;
+    use nirspi_wire::samples::{Samples, Width};
     use proptest::prelude::*;
 
     /// Calls `take` with a frame of these samples.
     fn with_frame<T>(values: &[i64], flags: FrameFlags, take: impl FnOnce(&Frame<'_>) -> T) -> T {
         let mut bytes = vec![0; 4 * values.len()];
-        let samples = Samples::pack(values.iter().copied(), &mut bytes).unwrap();
+        let samples = Samples::pack(values.iter().copied(), Width::Bits32, &mut bytes).unwrap();
         take(&Frame { run: 1, sequence: 0, device_time_us: 0, sweeps: 2, flags, samples })
     }
 

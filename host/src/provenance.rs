@@ -335,8 +335,8 @@ pub(crate) mod tests {
             board: "virtual".into(),
             serial: "virtual-1".into(),
             firmware: "0.1.0".into(),
-            gateware: "0.3.2".into(),
-            protocol: 4,
+            gateware: "0.4.0".into(),
+            protocol: 1,
         };
         let taken = Taken { origin: Origin::Simulated, camera: Some(camera), file: None };
         taken.made(&made)
@@ -351,7 +351,7 @@ pub(crate) mod tests {
             "origin": "simulated",
             "camera": {
                 "board": "virtual", "serial": "virtual-1", "firmware": "0.1.0",
-                "gateware": "0.3.2", "protocol": 4
+                "gateware": "0.4.0", "protocol": 1
             },
             "program": "nirspi 0.1.0",
             "commit": "0123456789ab",
@@ -380,9 +380,9 @@ pub(crate) mod tests {
     fn a_camera_in_an_emulator_is_simulated_and_one_on_a_board_measures() {
         let of = |board: &str| {
             let camera = CameraIdentity {
-                protocol: 4,
+                protocol: 1,
                 firmware: "0.1.0".into(),
-                gateware: "0.3.2".into(),
+                gateware: "0.4.0".into(),
                 board: board.into(),
                 serial: "A1".into(),
                 adc_hz: 125_000_000,

@@ -65,7 +65,7 @@ impl From<&Identity<'_>> for CameraIdentity {
             adc_hz: identity.adc_hz,
             adc_bits: identity.adc_bits,
             wavelength_nm: identity.wavelength_nm,
-            capabilities: in_words(identity.capabilities.0.unwrap_or_default()),
+            capabilities: in_words(identity.capabilities),
         }
     }
 }
@@ -156,8 +156,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Greets the camera behind `link` and chooses the newest protocol version that both sides
-    /// speak.
+    /// Greets the camera behind `link`.
     ///
     /// # Errors
     /// [`SessionError::Version`] if there is no common version; other errors if the device does not
@@ -165,24 +164,12 @@ impl Session {
     pub fn open(link: Box<dyn Link>) -> Result<Self, SessionError> {
         let mut conversation = Conversation::begin(link)?;
         let mut reports = Reports::default();
-        let mut greet = |protocol| conversation.ask(&request::Hello(protocol), &mut reports);
-        let identity = match greet(version::CURRENT) {
-            // The camera is older than this program, but this program still speaks its version.
-            Ok(identity) if identity.protocol < version::CURRENT => {
-                let protocol = identity.protocol;
-                if version::speaks(protocol) { greet(protocol) } else { Ok(identity) }
-            }
-            answer => answer,
-        };
-        match identity {
+        match conversation.ask(&request::Hello(version::CURRENT), &mut reports) {
             Ok(identity) if version::speaks(identity.protocol) => {
                 // Every command shows it: such a picture is not of the scene.
                 let can = |wanted| {
                     in_words(wanted).iter().all(|name| identity.capabilities.contains(name))
                 };
-                if can(Capabilities::NARROW_SAMPLES) {
-                    conversation.ask_narrow();
-                }
                 if can(Capabilities::BRING_UP) {
                     let what = design_in_words(Design::BringUp);
                     reports.keep(Some(format!("the camera runs the gateware for {what}")));

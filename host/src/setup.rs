@@ -4,8 +4,7 @@
 use nirspi_recon::{Order, Rows, RowsError, Side};
 use nirspi_wire::register::LATENCY_MAX;
 use nirspi_wire::{
-    ADC_HZ, CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource, Tail,
-    samples::Words,
+    ADC_HZ, CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource, samples::Words,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -144,7 +143,6 @@ impl MeasurementSetup {
             sweeps: self.sweeps,
             source: SampleSource::Detector,
             over_range_trip: 0,
-            narrow: Tail(None),
         })
     }
 }

@@ -25,7 +25,7 @@ impl Signal {
     /// camera without a meter.
     #[must_use]
     pub fn of(status: &Status) -> Option<Self> {
-        let signal = status.signal.0??;
+        let signal = status.signal?;
         let counts = |milli_counts: u32| f64::from(milli_counts) / 1e3;
         Some(Self {
             level_counts: counts(signal.mean_milli_counts),

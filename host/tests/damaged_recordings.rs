@@ -10,8 +10,8 @@ use nirspi::setup::MeasurementSetup;
 use nirspi::tally::tally_recording;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::samples::Samples;
-use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode};
+use nirspi_wire::samples::{Samples, Width};
+use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, version};
 use std::path::{Path, PathBuf};
 
 const RUN: u16 = 3;
@@ -26,7 +26,7 @@ fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
 fn recorded(folder: &Path) -> PathBuf {
     let path = folder.join("rec.mcap");
     let identity = CameraIdentity {
-        protocol: 2,
+        protocol: version::CURRENT,
         firmware: "0.3.1".into(),
         gateware: "1.2.0".into(),
         board: "virtual".into(),
@@ -48,7 +48,7 @@ fn recorded(folder: &Path) -> PathBuf {
             device_time_us: u64::from(sequence) * 82,
             sweeps: 1,
             flags: FrameFlags::DIFFERENTIAL,
-            samples: Samples::pack(values, &mut buffer).unwrap(),
+            samples: Samples::pack(values, Width::Bits32, &mut buffer).unwrap(),
         };
         recorder.packet(&packet(&DeviceMessage::Frame(frame))).unwrap();
     }

@@ -10,8 +10,10 @@ use nirspi::setup::MeasurementSetup;
 use nirspi::tally::tally_recording;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::samples::{Samples, Words};
-use nirspi_wire::{Depth, DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open};
+use nirspi_wire::samples::{Samples, Width, Words};
+use nirspi_wire::{
+    Depth, DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open, version,
+};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -35,7 +37,7 @@ fn frame(sequence: u32, patterns: usize) -> Vec<u8> {
         device_time_us: 5_000_000 + u64::from(sequence) * FRAME_US,
         sweeps: 1,
         flags: FrameFlags::DIFFERENTIAL,
-        samples: Samples::pack(values, &mut buffer).unwrap(),
+        samples: Samples::pack(values, Width::Bits32, &mut buffer).unwrap(),
     }))
 }
 
@@ -44,7 +46,7 @@ fn frame(sequence: u32, patterns: usize) -> Vec<u8> {
 fn recorded(folder: &Path, is_whole: bool) -> PathBuf {
     let path = folder.join("rec.mcap");
     let identity = CameraIdentity {
-        protocol: 2,
+        protocol: version::CURRENT,
         firmware: "0.3.1".into(),
         gateware: "1.2.0".into(),
         board: "nucleo-u5a5zj-q".into(),

@@ -10,10 +10,11 @@ use nirspi::session::{IgnorePackets, Session, SessionError, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::samples::Width;
 use nirspi_wire::{
     Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
-    FrameFlags, Identity, Refusal, Reply, Request, RunLength, Samples, State, Status, Tail,
-    Version, encode, open, version,
+    FrameFlags, Identity, Refusal, Reply, Request, RunLength, Samples, State, Status, Version,
+    encode, open, version,
 };
 use std::io;
 use std::ops::{ControlFlow, Range};
@@ -30,7 +31,7 @@ const IDENTITY: Identity<'static> = Identity {
     adc_hz: 0,
     adc_bits: 14,
     wavelength_nm: 1550,
-    capabilities: Tail(Some(Capabilities::DEPTH)),
+    capabilities: Capabilities::DEPTH,
 };
 
 /// Answers that arrive one at a time, whatever is asked.
@@ -87,7 +88,7 @@ fn status(state: State, run: u16, frames_made: u32) -> Answer<'static> {
         duty_permille: 500,
         leds_on: state == State::Running,
         interlock_closed: true,
-        signal: Tail(None),
+        signal: None,
     })
 }
 
@@ -113,7 +114,7 @@ impl Waiting {
                 device_time_us: 100 * u64::from(sequence),
                 sweeps: 1,
                 flags: FrameFlags::DIFFERENTIAL,
-                samples: Samples::pack([5].into_iter(), &mut [0; 4]).unwrap(),
+                samples: Samples::pack([5].into_iter(), Width::Bits32, &mut [0; 4]).unwrap(),
             }));
         }
     }

@@ -83,12 +83,6 @@ impl Camera {
         self.machine.poll(now, inputs, ports)
     }
 
-    /// Sends or counts a frame that the bus has kept, while the board transfers the next one: the
-    /// frame of [`Target::Bus`](crate::Target::Bus).
-    pub fn pack(&mut self, now: Micros, frame: &[u8], sink: &mut impl PacketSink) {
-        self.machine.pack(now, frame, sink);
-    }
-
     /// Sends or counts the packet that the board has transferred into the link's room
     /// ([`Target::Link`](crate::Target::Link)). Call this straight after the transfer: the next claim takes the room back.
     /// After any other transfer the call does nothing.
@@ -97,9 +91,7 @@ impl Camera {
         now: Micros,
         ports: &mut Ports<'_, B, S, G>,
     ) {
-        if self.machine.setup.is_some_and(|setup| setup.sends_packets()) {
-            self.machine.step_run(now, ports.bus, ports.sink);
-        }
+        self.machine.step_run(now, ports.bus, ports.sink);
     }
 
     /// Forwards a time-of-flight map of `side` x `side` distances in mm, measured now. The map is
@@ -155,7 +147,7 @@ impl Camera {
     pub fn lamps(&self, now: Micros) -> Lamps {
         let machine = &self.machine;
         let light = machine.off_pending || machine.state() == State::Running;
-        Lamps::at(now, machine.protocol().is_some(), light, machine.fault)
+        Lamps::at(now, machine.is_heard(), light, machine.fault)
     }
 
     /// What the calls act on, for the exhaustive walk of `tests::model`.

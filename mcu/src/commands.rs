@@ -13,10 +13,9 @@ use crate::{
     FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
 };
 use nirspi_wire::register::{Design, NO_CLOCK, ORDER_TABLE, Register, status};
-use nirspi_wire::samples::Width;
 use nirspi_wire::{
-    Answer, Capabilities, Command, Configuration, DeviceMessage, GatewareChunk, PATTERNS,
-    PatternOrder, Refusal, Reply, Request, Signal, State, Status, Tail, version,
+    Answer, Capabilities, Command, Configuration, GatewareChunk, PATTERNS, PatternOrder, Refusal,
+    Request, State, Status, version,
 };
 
 impl Machine {
@@ -32,7 +31,7 @@ impl Machine {
         self.last_command = now;
         let done = match command {
             Command::Hello { protocol } => return self.hello(id, now, protocol, *bus),
-            _ if self.protocol().is_none() => Err(Refusal::Protocol { device: version::CURRENT }),
+            _ if !self.is_heard() => Err(Refusal::Protocol { device: version::CURRENT }),
             Command::Configure(configuration) => {
                 self.configure(now, &configuration, inputs, *bus).map(|()| Answer::Done)
             }
@@ -58,38 +57,28 @@ impl Machine {
         self.reply(id, Outcome::Other(done));
     }
 
-    /// Refuses a command that this firmware does not know. In a session whose version lacks that
-    /// refusal, the request counts as damaged, as the firmware of that version counted it.
+    /// Refuses a command that this firmware does not know.
     pub(crate) fn refuse_unknown(&mut self, now: Micros, id: u16) {
-        let outcome = Err(Refusal::Unknown);
-        let since = DeviceMessage::Reply(Reply { id, outcome }).since();
-        match self.protocol() {
-            Some(protocol) if protocol < since => self.count_damage(now),
-            Some(_) => {
-                self.last_command = now;
-                self.reply(id, Outcome::Other(outcome));
-            }
-            None => {
-                let device = version::CURRENT;
-                self.reply(id, Outcome::Other(Err(Refusal::Protocol { device })));
-            }
-        }
+        let refusal = if self.is_heard() {
+            self.last_command = now;
+            Refusal::Unknown
+        } else {
+            Refusal::Protocol { device: version::CURRENT }
+        };
+        self.reply(id, Outcome::Other(Err(refusal)));
     }
 
     /// Opens a new session, and ends what the host before has left running.
     fn hello(&mut self, id: u16, now: Micros, protocol: u16, bus: &mut impl FpgaBus) {
         let gateware = fpga::version(bus);
-        let mut added = match fpga::design(bus) {
+        let added = match fpga::design(bus) {
             Ok(Design::BringUp) => Capabilities::BRING_UP,
             Ok(Design::Camera) | Err(_) => Capabilities::default(),
         };
-        if protocol >= Width::NARROW_SINCE {
-            added = added.with(Capabilities::NARROW_SAMPLES);
-        }
         let spoken = version::speaks(protocol);
         let answered = if spoken { protocol } else { version::CURRENT };
         self.stop(id, now, bus, Outcome::Hello { protocol: answered, gateware, added });
-        self.session = if spoken { Session::Open { protocol } } else { Session::Foreign };
+        self.session = if spoken { Session::Open } else { Session::Foreign };
         if spoken && self.crash.is_some() {
             self.notices.push(Notice::Crash);
         }
@@ -128,11 +117,8 @@ impl Machine {
         }
         self.loading = None;
         self.setup = None;
-        let version = fpga::read(bus, Register::Version).map_err(|_| Refusal::Bus)?;
-        let knows = self.protocol().is_some_and(|protocol| protocol >= Width::NARROW_SINCE);
-        setup.mode |= setup.packets(version, knows && configuration.narrow == Tail(Some(true)));
         if bus.ring().is_some() {
-            setup.mode |= setup.port(version);
+            setup.mode |= setup.port();
         }
         let table = match &configuration.order {
             PatternOrder::Table(table) => fpga::set_table(bus, table),
@@ -153,7 +139,6 @@ impl Machine {
         // If the FPGA does not answer, the reply assumes that the LEDs are on.
         let leds_on = fpga::read(bus, Register::Status)
             .map_or(!resting, |status| status != NO_CLOCK && status & status::LEDS_ON != 0);
-        let has_signal = self.protocol().is_some_and(|protocol| protocol >= Signal::SINCE);
         Status {
             state: self.state(),
             fault: self.fault,
@@ -169,7 +154,7 @@ impl Machine {
             duty_permille: self.setup.map_or(0, |setup| setup.duty_permille),
             leds_on,
             interlock_closed: inputs.interlock_closed,
-            signal: Tail(has_signal.then(|| self.meter.signal())),
+            signal: self.meter.signal(),
         }
     }
 

@@ -7,9 +7,7 @@
 
 use crate::{CLOCKS_PER_MICRO, Limits, Micros};
 use nirspi_wire::ready::{MAX_NARROW_SAMPLES, MAX_SUMMED_SAMPLES};
-use nirspi_wire::register::{
-    DUTY_WINDOW, LATENCY_MAX, has_parallel_port, measures_frames, mode, narrows_packets,
-};
+use nirspi_wire::register::{DUTY_WINDOW, LATENCY_MAX, mode};
 use nirspi_wire::samples::{Width, Words};
 use nirspi_wire::{
     ConfigField, ConfigProblem, Configuration, PATTERNS, PatternOrder, SampleSource,
@@ -41,35 +39,10 @@ impl Setup {
         u64::from(self.patterns).saturating_mul(self.dwell.into()).saturating_mul(halves)
     }
 
-    /// Bits of `Mode` for packets, which gateware of this version makes of the frames if no sum has too many samples
-    /// for it. With `asked`, the samples of packets have 24 bits where they hold every difference.
-    pub fn packets(&self, version: u32, asked: bool) -> u32 {
-        let samples = u32::from(self.dwell.saturating_sub(self.blank));
-        let samples = samples.saturating_mul(self.sweeps);
-        // A packet leaves out what the signal meter asks the FPGA for.
-        if !measures_frames(version) || samples > MAX_SUMMED_SAMPLES {
-            0
-        } else if asked && narrows_packets(version) && samples <= MAX_NARROW_SAMPLES {
-            mode::PACKETS | mode::NARROW
-        } else {
-            mode::PACKETS
-        }
-    }
-
-    /// Bits of `Mode` for packets that leave by the parallel port, of gateware of this version on a board that has the
-    /// port's wires.
-    pub fn port(&self, version: u32) -> u32 {
+    /// Bits of `Mode` for packets that leave by the parallel port, on a board that has the port's wires.
+    pub fn port(&self) -> u32 {
         let is_fast = self.frame_clocks() < FAST_FRAME.0.saturating_mul(CLOCKS_PER_MICRO);
-        if self.sends_packets() && is_fast && has_parallel_port(version) {
-            mode::PARALLEL
-        } else {
-            0
-        }
-    }
-
-    /// Whether the FPGA makes packets of the frames.
-    pub fn sends_packets(&self) -> bool {
-        self.mode & mode::PACKETS != 0
+        if is_fast { mode::PARALLEL } else { 0 }
     }
 
     /// Bits of a sample of a packet.
@@ -100,9 +73,15 @@ pub(crate) fn check(
     in_range(ConfigField::ClocksPerPattern, dwell.into(), 1, u16::MAX.into())?;
     in_range(ConfigField::Blanked, blanked.into(), 0, u32::from(dwell.saturating_sub(1)))?;
     in_range(ConfigField::AdcLatency, latency.into(), 0, LATENCY_MAX.into())?;
-    in_range(ConfigField::Sweeps, sweeps, 1, u32::MAX)?;
+    // The samples of a packet have 32 bits.
+    let samples_a_sweep = u32::from(dwell.saturating_sub(blanked));
+    let most = MAX_SUMMED_SAMPLES.checked_div(samples_a_sweep).unwrap_or(0);
+    in_range(ConfigField::Sweeps, sweeps, 1, most)?;
 
-    let mut mode = order;
+    let mut mode = order | mode::PACKETS;
+    if samples_a_sweep.saturating_mul(sweeps) <= MAX_NARROW_SAMPLES {
+        mode |= mode::NARROW;
+    }
     if configuration.differential {
         mode |= mode::DIFFERENTIAL;
     }
@@ -199,7 +178,6 @@ impl Light<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nirspi_wire::Tail;
     use proptest::prelude::*;
 
     const PAIRS: Configuration<'static> = Configuration {
@@ -212,7 +190,6 @@ mod tests {
         sweeps: 10,
         source: SampleSource::Detector,
         over_range_trip: 0,
-        narrow: Tail(None),
     };
 
     fn permille(configuration: Configuration<'_>) -> Result<u16, ConfigProblem> {

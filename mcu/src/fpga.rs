@@ -129,19 +129,13 @@ pub(crate) fn version(bus: &mut impl FpgaBus) -> Version {
     }
 }
 
-/// Says what the packets of the next run carry beside their frames: the number of the run, and the device time of the
-/// next read of the clock.
+/// Says what the packets of the next run carry beside their frames: the number of the run, and the device time now, which
+/// belongs to the FPGA's clock of the last read.
 pub(crate) fn stamp(bus: &mut impl FpgaBus, run: u16, time: Micros) -> Result<(), BusError> {
     write(bus, Register::Run, run.into())?;
     write(bus, Register::TimeLow, time.0 as u32)?;
-    write(bus, Register::TimeHigh, (time.0 >> 32) as u32)
-}
-
-/// Clocks since the FPGA's reset.
-pub(crate) fn clock(bus: &mut impl FpgaBus) -> Result<u64, BusError> {
-    let low = read(bus, Register::ClockLow)?;
-    let high = read(bus, Register::ClockHigh)?;
-    Ok(u64::from(high) << 32 | u64::from(low))
+    write(bus, Register::TimeHigh, (time.0 >> 32) as u32)?;
+    read(bus, Register::ClockLow).map(drop)
 }
 
 /// The value read back is not the value written.

@@ -16,7 +16,7 @@
 //! ) {
 //!     match bus.wanted() {
 //!         None => {}
-//!         Some(Wanted { port, opcode, into: Target::Bus { bytes, .. } }) => {
+//!         Some(Wanted { port, opcode, into: Target::Bus(bytes) }) => {
 //!             let done = read(port, opcode, bytes).await;
 //!             bus.transferred(done);
 //!         }
@@ -38,33 +38,26 @@
 //! a write that was not taken. So a start or a release acts once. The entries of the order table are
 //! not asked for one by one, because the camera reads the whole table back.
 //!
-//! A frame that the FPGA has made into a packet ([`nirspi_wire::ready`]) goes straight into the link's
-//! room, and needs no buffer of the bus. Whether the FPGA can clock such a read by `sck` itself
-//! ([`READ_PACKET`]), the bus learns from the reads of [`Register::Version`] that pass through it.
+//! In a run the FPGA makes packets of its frames ([`nirspi_wire::ready`]). A packet goes straight into the link's
+//! room, and needs no buffer of the bus. Such a read is clocked by `sck` itself ([`READ_PACKET`]).
 //!
 //! Packets of the FPGA's parallel port come by no transfer: a board that has the port's wires has the
 //! [`Ring`] into which its DMA writes them. A start makes the ring forget what came before.
-//!
-//! With a second buffer ([`PortBus::with_spare`]) a frame can be kept: the camera packs it while the
-//! next frame is transferred into the other buffer.
 //!
 //! # Invariant
 //! Transferred data is given unchanged until the FPGA gets a release or a new start
 //! (`tests::host_port::a_frame_is_transferred_once_and_given_until_it_is_released`). After a
 //! release, data from before it is never given again
-//! (`tests::host_port::after_a_release_an_older_frame_is_never_given`), but for a kept frame, which
-//! is given once (`tests::host_port::a_kept_frame_outlives_its_release_and_is_given_once`).
+//! (`tests::host_port::after_a_release_an_older_frame_is_never_given`).
 //!
 //! A damaged answer is never given, and a damaged write is repeated or an error
 //! (`tests::wires::no_damaged_answer_is_believed_and_no_damaged_write_is_taken_for_done`).
 
 use crate::{BusError, FpgaBus, Ring};
 use nirspi_wire::fpga::{MAX_FRAME_BYTES, frame_bytes};
-use nirspi_wire::host_port::{
-    READ_FRAME, READ_PACKET, READ_RAW, SEALED_BYTES, seal, unchecked, unseal,
-};
-use nirspi_wire::ready::{self, FAST_LEAD_BYTES, LEAD_BYTES};
-use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, clocks_packets, control, mode};
+use nirspi_wire::host_port::{READ_FRAME, READ_PACKET, READ_RAW, SEALED_BYTES, seal, unseal};
+use nirspi_wire::ready::fast_read_bytes;
+use nirspi_wire::register::{NO_CLOCK, ORDER_TABLE, Register, control, mode};
 use nirspi_wire::samples::Width;
 
 /// Number of attempts at a transfer. The FPGA keeps the data until the release.
@@ -130,10 +123,6 @@ enum Transfer {
 pub struct PortBus<'b, P> {
     port: P,
     buffer: &'b mut [u8; MAX_FRAME_BYTES],
-    /// Memory of the kept frame.
-    spare: Option<&'b mut [u8; MAX_FRAME_BYTES]>,
-    /// `spare` holds a frame that has not been given.
-    keeps: bool,
     transfer: Transfer,
     /// The values written last. The FPGA copies them when it starts.
     mode: u32,
@@ -141,10 +130,6 @@ pub struct PortBus<'b, P> {
     raw_samples: u32,
     /// Frames of this run are packets, which go into the link's room.
     packets: bool,
-    /// The gateware knows [`READ_PACKET`].
-    clocks_packets: bool,
-    /// Opcode that reads a frame or packet of this run.
-    opcode: u8,
     /// Bytes of a frame or packet.
     frame_bytes: usize,
     raw_bytes: usize,
@@ -169,12 +154,7 @@ pub struct Wanted<'w, P> {
 #[derive(Debug)]
 pub enum Target<'w> {
     /// Into memory of the bus.
-    Bus {
-        /// The bytes to fill.
-        bytes: &'w mut [u8],
-        /// The frame before, for [`Camera::pack`](crate::Camera::pack) during the transfer.
-        kept: Option<&'w [u8]>,
-    },
+    Bus(&'w mut [u8]),
     /// Into room of the link for so many bytes, which the board claims. After the transfer and before anything
     /// else is claimed, the board must call [`Camera::forward`](crate::Camera::forward); without room it makes
     /// that call alone.
@@ -189,15 +169,11 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         let mut bus = Self {
             port,
             buffer,
-            spare: None,
-            keeps: false,
             transfer: Transfer::None,
             mode: Register::Mode.reset(),
             patterns: Register::Patterns.reset(),
             raw_samples: Register::RawLength.reset(),
             packets: false,
-            clocks_packets: false,
-            opcode: READ_FRAME,
             frame_bytes: 0,
             raw_bytes: 0,
             writes: None,
@@ -205,13 +181,6 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         };
         bus.take_lengths();
         bus
-    }
-
-    /// The bus with memory for a second frame, so that one frame is packed while the next comes.
-    #[must_use]
-    pub fn with_spare(mut self, spare: Option<&'b mut [u8; MAX_FRAME_BYTES]>) -> Self {
-        self.spare = spare;
-        self
     }
 
     /// The port, for access to its other lines.
@@ -224,17 +193,14 @@ impl<'b, P: HostPort> PortBus<'b, P> {
     pub fn wanted(&mut self) -> Option<Wanted<'_, P>> {
         let Transfer::Wanted { data, .. } = self.transfer else { return None };
         let (opcode, length) = match data {
-            Data::Frame => (self.opcode, self.frame_bytes),
+            Data::Frame if self.packets => {
+                let into = Target::Link(self.frame_bytes);
+                return Some(Wanted { port: &mut self.port, opcode: READ_PACKET, into });
+            }
+            Data::Frame => (READ_FRAME, self.frame_bytes),
             Data::Raw => (READ_RAW, self.raw_bytes),
         };
-        let into = if self.packets && data == Data::Frame {
-            Target::Link(length)
-        } else {
-            let bytes = self.buffer.get_mut(..length)?;
-            let keeps = core::mem::take(&mut self.keeps);
-            let kept = self.spare.as_deref().filter(|_| keeps);
-            Target::Bus { bytes, kept: kept.and_then(|kept| kept.get(..self.frame_bytes)) }
-        };
+        let into = Target::Bus(self.buffer.get_mut(..length)?);
         Some(Wanted { port: &mut self.port, opcode, into })
     }
 
@@ -255,9 +221,8 @@ impl<'b, P: HostPort> PortBus<'b, P> {
 
     /// Reads a register, at most [`REGISTER_ATTEMPTS`] times.
     ///
-    /// Two answers count without a check if they are the same every time, because all that follows from
-    /// them is a refusal that names the cause: an identity, whose value shows crossed wires, and the
-    /// version of gateware that sends no check.
+    /// An identity counts without a check if it is the same every time, because all that follows is a refusal whose
+    /// value shows crossed wires.
     fn read_checked(&mut self, address: u16) -> Result<u32, BusError> {
         let mut steady = None;
         for attempt in 0..REGISTER_ATTEMPTS {
@@ -268,14 +233,10 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             self.count_damage();
             steady = if attempt == 0 { Some(sealed) } else { steady.filter(|&s| s == sealed) };
         }
-        let value = match Register::at(address) {
-            Some(Register::Identity) => {
-                steady.map(|[v0, v1, v2, v3, ..]| u32::from_be_bytes([v0, v1, v2, v3]))
-            }
-            Some(Register::Version) => steady.and_then(unchecked),
-            _ => None,
-        };
-        value.ok_or(BusError::Damaged)
+        steady
+            .filter(|_| address == Register::Identity.address())
+            .map(|[v0, v1, v2, v3, ..]| u32::from_be_bytes([v0, v1, v2, v3]))
+            .ok_or(BusError::Damaged)
     }
 
     /// Writes a register, at most [`REGISTER_ATTEMPTS`] times until the FPGA has taken the write. The
@@ -337,7 +298,6 @@ impl<'b, P: HostPort> PortBus<'b, P> {
             self.transfer = Transfer::None;
         }
         if starts {
-            self.keeps = false;
             self.port.look();
             if let Some(ring) = self.port.ring() {
                 ring.restart();
@@ -352,11 +312,8 @@ impl<'b, P: HostPort> PortBus<'b, P> {
         let patterns = u16::try_from(self.patterns).unwrap_or(u16::MAX);
         self.packets = self.mode & mode::PACKETS != 0;
         let width = if self.mode & mode::NARROW == 0 { Width::Bits32 } else { Width::Bits24 };
-        let fast = self.packets && self.clocks_packets;
-        self.opcode = if fast { READ_PACKET } else { READ_FRAME };
-        let lead = if fast { FAST_LEAD_BYTES } else { LEAD_BYTES };
         self.frame_bytes = within(match self.packets {
-            true => lead.saturating_add(ready::packet_bytes(patterns, width)),
+            true => fast_read_bytes(patterns, width),
             false => frame_bytes(patterns),
         });
         let samples = usize::try_from(self.raw_samples).unwrap_or(usize::MAX);
@@ -366,11 +323,7 @@ impl<'b, P: HostPort> PortBus<'b, P> {
 
 impl<P: HostPort> FpgaBus for PortBus<'_, P> {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        let value = self.read_checked(address)?;
-        if address == Register::Version.address() {
-            self.clocks_packets = clocks_packets(value);
-        }
-        Ok(value)
+        self.read_checked(address)
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
@@ -406,10 +359,6 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
         self.data(Data::Frame)
     }
 
-    fn packet_bytes(&self, _patterns: u16, _width: Width) -> usize {
-        self.frame_bytes
-    }
-
     fn packet(&mut self, _room: &mut [u8]) -> Result<bool, BusError> {
         // The bytes came into the room by themselves. They are given once, because the room is the link's.
         let has_come = self.data(Data::Frame)?.is_some();
@@ -425,26 +374,6 @@ impl<P: HostPort> FpgaBus for PortBus<'_, P> {
 
     fn look(&mut self) {
         self.port.look();
-    }
-
-    fn streams(&mut self) -> bool {
-        self.port.ring().is_some() && self.mode & mode::PARALLEL != 0
-    }
-
-    fn keep(&mut self) -> bool {
-        let Some(spare) = &mut self.spare else { return false };
-        if self.transfer != Transfer::Held(Data::Frame) {
-            return false;
-        }
-        core::mem::swap(spare, &mut self.buffer);
-        self.keeps = true;
-        self.transfer = Transfer::None;
-        true
-    }
-
-    fn kept(&mut self) -> Option<&[u8]> {
-        let keeps = core::mem::take(&mut self.keeps);
-        self.spare.as_deref().filter(|_| keeps)?.get(..self.frame_bytes)
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {

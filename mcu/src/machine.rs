@@ -17,17 +17,15 @@ use crate::notices::{Notice, Notices, Outcome};
 use crate::run::{self, Counters, Fpga, Run, SAMPLE_BYTES};
 use crate::selftest::{self, TestFrame};
 use crate::{BoardInfo, Crash, FpgaBus, Inputs, Limits, Micros, PacketSink, fpga, safety};
-use nirspi_wire::{
-    Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State, version,
-};
+use nirspi_wire::{Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State};
 
 /// State of the session with the host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Session {
     /// No `Hello` since power-up or since the link was closed.
     Closed,
-    /// Host and camera speak this protocol version.
-    Open { protocol: u16 },
+    /// Host and camera speak the same protocol version.
+    Open,
     /// The host speaks a version that this firmware does not. The camera answers with its own
     /// version and nothing else.
     Foreign,
@@ -71,7 +69,7 @@ pub(crate) struct Machine {
     pub release_pending: bool,
     /// The damaged accesses that a host was last told of, and when.
     pub damage_told: (u32, Micros),
-    /// Samples of a frame or distances of a map, on their way into a packet.
+    /// Samples of a frame that the signal meter compares with the next, or distances of a map.
     pub scratch: [u8; SAMPLE_BYTES],
 }
 
@@ -127,17 +125,14 @@ impl Machine {
         matches!(self.fault, Some(Fault::FpgaAbsent { .. }))
     }
 
-    /// The protocol version of the session; `None` without a session.
-    pub fn protocol(&self) -> Option<u16> {
-        match self.session {
-            Session::Open { protocol } => Some(protocol),
-            Session::Closed | Session::Foreign => None,
-        }
+    /// Whether a host with this protocol listens.
+    pub fn is_heard(&self) -> bool {
+        self.session == Session::Open
     }
 
     /// Whether frames may go out: a host listens, and no reply or event waits.
     pub fn may_stream(&self) -> bool {
-        self.protocol().is_some() && self.notices.is_empty()
+        self.is_heard() && self.notices.is_empty()
     }
 
     pub fn reply(&mut self, id: u16, outcome: Outcome) {
@@ -147,14 +142,13 @@ impl Machine {
     /// Reports an event to a host that speaks this protocol. Without such a host the event is not kept: the next host
     /// learns the state from `Status`.
     pub fn notify(&mut self, now: Micros, kind: EventKind) {
-        if self.protocol().is_some() {
+        if self.is_heard() {
             self.notices.push(Notice::Event(Event { device_time_us: now.0, kind }));
         }
     }
 
     pub fn flush(&mut self, sink: &mut impl PacketSink) -> bool {
-        let protocol = self.protocol().unwrap_or(version::CURRENT);
-        self.notices.flush(protocol, &self.info, &mut self.crash, sink)
+        self.notices.flush(&self.info, &mut self.crash, sink)
     }
 
     /// Switches the LEDs off. Every poll repeats this until the FPGA says that the LEDs are off.
@@ -222,7 +216,7 @@ impl Machine {
         let path = run::Path { counters, meter, scratch: &mut self.scratch, may_send };
         let may_come = !absent && !self.release_pending;
         let release_pending = &mut self.release_pending;
-        let worked = run.take_frame(now, path, (may_come, release_pending), bus, sink);
+        let worked = run.take(now, path, (may_come, release_pending), bus, sink);
         match run.progress(now, &self.counters) {
             run::Progress::Complete => self.end_run(now, None, bus),
             run::Progress::Stalled => {
@@ -232,15 +226,6 @@ impl Machine {
             run::Progress::UnderWay => self.wind_up(now, bus),
         }
         worked
-    }
-
-    /// Sends or counts a kept frame of this run.
-    pub fn pack(&mut self, now: Micros, frame: &[u8], sink: &mut impl PacketSink) {
-        let may_send = self.may_stream();
-        let Activity::Run(run) = &mut self.activity else { return };
-        let (counters, meter) = (&mut self.counters, &mut self.meter);
-        let path = run::Path { counters, meter, scratch: &mut self.scratch, may_send };
-        run.pack(now, path, frame, sink);
     }
 
     /// Switches the LEDs off. `reply` and `RunEnded` follow the last frame.

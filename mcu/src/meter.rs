@@ -6,7 +6,7 @@
 //! is signal and noise. The meter adds up integers while frames pass; [`Tally::signal`] computes
 //! counts and decibels in floating point when the host asks for the status.
 //!
-//! Of a frame that the FPGA has made into a packet, the meter reads the samples in the packet, and the sum of all
+//! The meter reads the samples in a frame's packet, and the sum of all
 //! samples and the number over range in registers of the FPGA. A packet that the wires have damaged is no
 //! frame. When a packet of the parallel port is looked at, the registers are already those of a frame that the FPGA
 //! sends after it; between two frames the registers hold 0, and the meter measures nothing.
@@ -17,7 +17,6 @@
 
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Micros, float, fpga};
-use nirspi_wire::fpga::{FpgaFrame, Header};
 use nirspi_wire::ready::Reader;
 use nirspi_wire::register::{Register, mode};
 use nirspi_wire::{ADC_BITS, FrameFlags, Signal};
@@ -65,9 +64,8 @@ impl Exposure {
 enum Pair {
     /// The next pair begins at this time.
     Due(Micros),
-    /// The first frame of a pair has passed: its packed samples have this shift, and still lie in
-    /// the memory into which samples are packed.
-    Begun { sequence: u32, at: Micros, shift: u8 },
+    /// The first frame of a pair has passed, and its samples lie in the scratch memory.
+    Begun { sequence: u32, at: Micros },
 }
 
 #[derive(Debug)]
@@ -89,30 +87,6 @@ impl Meter {
         self.exposure = Exposure::of(setup);
         self.pair = Pair::Due(now);
         self.last = None;
-    }
-
-    /// Looks at an intact frame of the run before its samples are packed into `packed`, which still
-    /// holds the samples of the frame before.
-    pub fn compare(&mut self, frame: &FpgaFrame<'_>, packed: &[u8]) {
-        let Pair::Begun { sequence, at, shift } = self.pair else { return };
-        let header = &frame.header;
-        let length = usize::from(header.patterns).saturating_mul(4);
-        let before = packed.get(..length).map(|words| (words, shift));
-        let follows = header.sequence == sequence.wrapping_add(1) && !has_wrapped(header);
-        self.pair = match before.filter(|_| follows) {
-            Some(before) => {
-                let (mut levels, mut sums) = (0u64, frame.sums());
-                let mut reading = || {
-                    let sums = sums.next().unwrap_or_default();
-                    levels = levels.wrapping_add(sums.positive).wrapping_add(sums.negative);
-                    sums.difference()
-                };
-                let tally = self.tally(&mut reading, before);
-                self.last = Some(Tally { levels, over_range: header.over_range, ..tally });
-                Pair::Due(Micros(at.0.saturating_add(PERIOD.0)))
-            }
-            None => Pair::Due(at),
-        };
     }
 
     /// Whether [`look`](Self::look) would read a packet now.
@@ -142,7 +116,7 @@ impl Meter {
         let Some(memory) = scratch.get_mut(..length) else { return };
         self.pair = Pair::Due(due);
         if follows && counts {
-            let tally = self.tally(&mut || reader.sample().into(), (memory, 0));
+            let tally = self.tally(&mut || reader.sample(), memory);
             if let (true, Ok((levels, over_range))) = (reader.is_intact(), measures(bus)) {
                 self.last = Some(Tally { levels, over_range, ..tally });
                 self.pair = Pair::Due(Micros(due.0.saturating_add(PERIOD.0)));
@@ -156,23 +130,12 @@ impl Meter {
                 *word = reader.sample().to_le_bytes();
             }
             if counts && reader.is_intact() {
-                self.pair = Pair::Begun { sequence, at: now, shift: 0 };
+                self.pair = Pair::Begun { sequence, at: now };
             }
         }
     }
 
-    /// Notes that the samples of an intact frame have been packed with this shift. Most frames cost
-    /// a comparison of two times.
-    pub fn keep(&mut self, now: Micros, header: &Header, shift: u8) {
-        if let Pair::Due(at) = self.pair
-            && now >= at
-            && !has_wrapped(header)
-        {
-            self.pair = Pair::Begun { sequence: header.sequence, at: now, shift };
-        }
-    }
-
-    /// Notes that the memory of packed samples holds something else now.
+    /// Notes that the scratch memory holds something else now.
     pub fn forget(&mut self) {
         if let Pair::Begun { at, .. } = self.pair {
             self.pair = Pair::Due(at);
@@ -184,16 +147,14 @@ impl Meter {
         self.last.as_ref().map(Tally::signal)
     }
 
-    /// Sums over the readings of a frame, which `next` gives one by one, and of the frame before, whose packed samples
-    /// of 32 bits have this shift.
-    fn tally(&self, next: &mut dyn FnMut() -> i64, (packed, of_packed): (&[u8], u8)) -> Tally {
+    /// Sums over the readings of a frame, which `next` gives one by one, and of the frame before.
+    fn tally(&self, next: &mut dyn FnMut() -> i32, before: &[u8]) -> Tally {
         let mut tally = Tally { exposure: self.exposure, ..Tally::default() };
         let shift = self.exposure.shift();
-        let (words, _) = packed.as_chunks();
+        let (words, _) = before.as_chunks();
         for word in words {
-            let before = i64::from(i32::from_le_bytes(*word)).wrapping_shl(of_packed.into());
-            let reading = shifted(next(), shift);
-            let change = reading.wrapping_sub(shifted(before, shift));
+            let reading = next() >> shift;
+            let change = reading.wrapping_sub(i32::from_le_bytes(*word) >> shift);
             tally.readings = tally.readings.wrapping_add(1);
             tally.sum = tally.sum.wrapping_add(reading.into());
             tally.squares = tally.squares.wrapping_add(square(reading));
@@ -213,18 +174,6 @@ fn measures(bus: &mut impl FpgaBus) -> Result<(u64, u32), BusError> {
         return Err(BusError::Transfer);
     }
     Ok(found)
-}
-
-/// The frame's sums have wrapped, so they say nothing.
-fn has_wrapped(header: &Header) -> bool {
-    header.flags.contains(FrameFlags::OVERFLOW)
-}
-
-/// A pattern's reading in at most [`READING_BITS`].
-fn shifted(reading: i64, shift: u32) -> i32 {
-    // Up to 682 sweeps of three samples there is no shift, and a shift of 64 bits takes a dozen
-    // instructions.
-    if shift == 0 { reading as i32 } else { reading.wrapping_shr(shift) as i32 }
 }
 
 /// One instruction for the product of two words.

@@ -11,7 +11,7 @@ use heapless::Deque;
 use nirspi_wire::message::CRASH_TEXT_MAX;
 use nirspi_wire::{
     ADC_BITS, ADC_HZ, Answer, Capabilities, CrashReport, DeviceMessage, Event, Identity, Refusal,
-    Reply, SIDE, Tail, Version, WAVELENGTH_NM,
+    Reply, SIDE, Version, WAVELENGTH_NM,
 };
 
 /// The outcome of a command, without borrowed data.
@@ -83,11 +83,9 @@ impl Notices {
         self.0.clear();
     }
 
-    /// Sends what the link has room for; true if anything was sent. A notice that version
-    /// `protocol` does not have is dropped.
+    /// Sends what the link has room for; true if anything was sent.
     pub fn flush(
         &mut self,
-        protocol: u16,
         info: &BoardInfo,
         crash: &mut Option<Crash>,
         sink: &mut impl PacketSink,
@@ -95,7 +93,6 @@ impl Notices {
         let mut worked = false;
         while let Some(notice) = self.0.front() {
             let sent = message(notice, info, crash.as_ref())
-                .filter(|message| message.since() <= protocol)
                 .is_none_or(|message| send(&message, NOTICE_BYTES, sink));
             if !sent {
                 break;
@@ -136,9 +133,7 @@ fn message<'m>(
                 adc_hz: ADC_HZ,
                 adc_bits: ADC_BITS,
                 wavelength_nm: WAVELENGTH_NM,
-                capabilities: Tail(
-                    (protocol >= Capabilities::SINCE).then_some(info.capabilities.with(added)),
-                ),
+                capabilities: info.capabilities.with(added),
             };
             DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Hello(identity)) })
         }

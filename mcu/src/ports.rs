@@ -7,7 +7,6 @@
 use crate::{Loan, Micros, Ring};
 use core::ops::Range;
 use heapless::String;
-use nirspi_wire::samples::Width;
 use nirspi_wire::{Capabilities, RebootInto, Version};
 
 /// Why an access to the FPGA failed.
@@ -58,13 +57,8 @@ pub trait FpgaBus {
     /// [`BusError`]; the firmware then discards and releases the frame.
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError>;
 
-    /// Bytes to read of a packet of so many patterns, with samples of this width.
-    fn packet_bytes(&self, patterns: u16, width: Width) -> usize {
-        nirspi_wire::ready::read_bytes(patterns, width)
-    }
-
     /// Reads the packet that is ready into `room`, which is of the link and has
-    /// [`packet_bytes`](Self::packet_bytes): zeros, the packet, zeros. False during the transfer, which
+    /// [`fast_read_bytes`](nirspi_wire::ready::fast_read_bytes): zeros, the packet, zeros. False during the transfer, which
     /// a board carries out into the same room before the next call.
     ///
     /// # Errors
@@ -86,23 +80,6 @@ pub trait FpgaBus {
 
     /// Notes in that ring what has come until now, and lets the FPGA send for as long as the ring grants.
     fn look(&mut self) {}
-
-    /// Whether the packets of the run under way come by that ring.
-    fn streams(&mut self) -> bool {
-        false
-    }
-
-    /// Puts the frame that [`frame`](Self::frame) gives where neither its release nor the transfer of
-    /// the next frame touches it, so that transfer and work overlap. False: this bus has no frame,
-    /// or no memory for a second one.
-    fn keep(&mut self) -> bool {
-        false
-    }
-
-    /// The kept frame. A kept frame is given once, and not after a start.
-    fn kept(&mut self) -> Option<&[u8]> {
-        None
-    }
 
     /// The whole raw burst that is ready, as little-endian `u16` samples; `None` during its
     /// transfer. Each call gives the same bytes until the next start.

@@ -10,24 +10,15 @@ mod stream;
 use crate::configure::Setup;
 use crate::meter::Meter;
 use crate::notices::Outcome;
-use crate::packets::{STREAM_HEADER_BYTES, send};
-use crate::time::Anchor;
 use crate::{FpgaBus, Limits, Micros, PacketSink, configure, fpga};
-use nirspi_wire::fpga::{FpgaFrame, Header};
 use nirspi_wire::ready::{self, BEGINNING_BYTES};
-use nirspi_wire::register::{NO_CLOCK, Register, control};
+use nirspi_wire::register::{NO_CLOCK, Register, control, mode};
 use nirspi_wire::samples::Width;
-use nirspi_wire::{
-    ConfigField, DeviceMessage, EventKind, Fault, Frame, PATTERNS, Refusal, RunLength, Samples,
-};
+use nirspi_wire::{ConfigField, EventKind, Fault, PATTERNS, Refusal, RunLength};
 
 /// Longest time that the end of a run waits for frames that the FPGA has counted as made. A
 /// transfer of the longest frame takes well under a millisecond.
 const DRAIN_PATIENCE: Micros = Micros(100_000);
-
-/// Longest time that a kept frame waits for the next transfer. Packing the longest frame takes about as
-/// long, so a longer wait gains nothing.
-const KEPT_PATIENCE: Micros = Micros(1_000);
 
 /// Longest time from the moment when a full ring has room again until the frames that waited in the FPGA are there: four
 /// of the longest packets take 0.4 ms, and the loop looks once in a millisecond.
@@ -79,15 +70,6 @@ impl Counters {
         self.advance(made, lost);
         self.reconcile();
         Ok(())
-    }
-
-    /// Counts a frame that was ready and could not be read, whose number is unknown. `false`: every
-    /// frame that the FPGA has made is counted already, so the bus has lost the release of this frame; or the
-    /// FPGA does not answer, and the end of the run will count what is missing.
-    fn count_corrupt(&mut self, bus: &mut impl FpgaBus) -> bool {
-        let is_new = self.read(bus).is_ok() && self.missing() > 0;
-        self.corrupt = self.corrupt.wrapping_add(is_new.into());
-        is_new
     }
 
     /// Takes back what was counted as damaged and is counted elsewhere too. A frame that could not be
@@ -145,9 +127,10 @@ impl Counters {
 pub(crate) struct Run {
     length: RunLength,
     patterns: u16,
-    /// The FPGA makes packets of the frames, with samples of this width.
-    packets: Option<Width>,
-    anchor: Anchor,
+    /// Bits of a sample of a packet.
+    width: Width,
+    /// Packets come by the parallel port.
+    is_parallel: bool,
     stall_after: Micros,
     last_frame: Micros,
     /// When the ring of the parallel port was full at a look, so that the FPGA had to wait.
@@ -155,12 +138,6 @@ pub(crate) struct Run {
     last_sequence: Option<u32>,
     /// How the packet that was sent last began.
     last_beginning: [u8; BEGINNING_BYTES],
-    /// The bus keeps a frame that has not been packed, since then.
-    kept: Option<Micros>,
-    /// Number of the frame that was kept last, which may be a damaged one.
-    last_kept: Option<u32>,
-    /// The kept frame could not be read, and is not counted yet.
-    damaged: bool,
     ending: Option<Ending>,
 }
 
@@ -178,7 +155,7 @@ struct Ending {
 pub(crate) struct Path<'m> {
     pub counters: &'m mut Counters,
     pub meter: &'m mut Meter,
-    /// Memory for the frame's packed samples.
+    /// Memory for the samples of the frame before, for the meter.
     pub scratch: &'m mut [u8],
     /// A host listens, and no reply or event waits.
     pub may_send: bool,
@@ -232,34 +209,24 @@ impl Run {
                 frames
             }
         };
-        let packets = setup.sends_packets().then(|| setup.width());
-        let (anchor, started) = fpga::verify(bus, setup, limits)
+        let started = fpga::verify(bus, setup, limits)
             .and_then(|()| Ok(fpga::write(bus, Register::Frames, frames)?))
-            .and_then(
-                |()| if packets.is_some() { Ok(fpga::stamp(bus, number, now)?) } else { Ok(()) },
-            )
-            .and_then(|()| Ok(fpga::clock(bus)?))
+            .and_then(|()| Ok(fpga::stamp(bus, number, now)?))
             .map_err(|_| fpga::health(bus).err().unwrap_or(Fault::FpgaConfiguration))
-            .and_then(|clock| {
-                let started = fpga::start(bus, control::START)?;
-                Ok((Anchor { clock, time: now }, started))
-            })
+            .and_then(|()| fpga::start(bus, control::START))
             .map_err(Refusal::Fault)?;
         let frame_micros = setup.frame_clocks() / crate::CLOCKS_PER_MICRO;
         let stall_after = frame_micros.saturating_mul(limits.stall_frames.into());
         let run = Self {
             length,
             patterns: setup.patterns,
-            packets,
-            anchor,
+            width: setup.width(),
+            is_parallel: setup.mode & mode::PARALLEL != 0,
             stall_after: Micros(stall_after).max(limits.stall_min),
             last_frame: now,
             last_full: None,
             last_sequence: None,
             last_beginning: [0; _],
-            kept: None,
-            last_kept: None,
-            damaged: false,
             ending: None,
         };
         if started == fpga::Started::OverAlready {
@@ -273,7 +240,7 @@ impl Run {
 
     /// What the rest of the run depends on, with ages for times.
     #[cfg(test)]
-    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 12] {
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 10] {
         let ending = self.ending.as_ref();
         let length = match self.length {
             RunLength::Continuous => 0,
@@ -284,13 +251,11 @@ impl Run {
             self.patterns.into(),
             age(self.last_frame),
             self.last_full.map_or(u64::MAX, &age),
-            self.kept.map_or(u64::MAX, &age),
-            self.damaged.into(),
             self.last_sequence.map_or(0, |last| u64::from(last) + 1),
-            self.last_kept.map_or(0, |last| u64::from(last) + 1),
             ending.map_or(u64::MAX, |ending| age(ending.since)),
             ending.and_then(|ending| ending.reply).map_or(0, |(id, _)| u64::from(id) + 1),
-            self.packets.map_or(0, |width| width.bytes() as u64),
+            self.width.bytes() as u64,
+            self.is_parallel.into(),
             // The sequence: the rest of the beginning is absolute.
             self.last_beginning[5..9].iter().fold(0, |key, &byte| key << 8 | u64::from(byte)),
         ]
@@ -326,8 +291,26 @@ impl Run {
         }
     }
 
-    /// Takes at most one packet of the FPGA, which goes to the host as it is; true if there was work. It is asked for
-    /// only if the link has room; a frame without room is released unread.
+    /// Takes packets of the FPGA, which go to the host as they are; true if there was work.
+    ///
+    /// `may_come` is false if the FPGA does not answer, and after a failed release, when the line
+    /// still signals the frame that was taken before. `release_pending` is set if a release fails.
+    pub fn take(
+        &mut self,
+        now: Micros,
+        path: Path<'_>,
+        (may_come, release_pending): (bool, &mut bool),
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        if self.is_parallel {
+            return self.take_streamed(now, path, bus, sink);
+        }
+        may_come && bus.frame_ready() && self.take_packet(now, path, release_pending, bus, sink)
+    }
+
+    /// Takes at most one packet by the host port. It is asked for only if the link has room; a frame without room is
+    /// released unread.
     ///
     /// The wires may have damaged the packet. Its CRC-32 is the host's to look at; here a packet counts as sent, and
     /// as damaged only if none can be found.
@@ -335,18 +318,18 @@ impl Run {
         &mut self,
         now: Micros,
         path: Path<'_>,
-        (width, release_pending): (Width, &mut bool),
+        release_pending: &mut bool,
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
         let Path { counters, meter, scratch, may_send } = path;
-        let length = bus.packet_bytes(self.patterns, width);
+        let length = ready::fast_read_bytes(self.patterns, self.width);
         let mut room = if may_send { sink.claim(length) } else { None };
         let mut place = None;
         if let Some(room) = &mut room {
             match bus.packet(room) {
                 Ok(false) => return false,
-                Ok(true) => place = ready::packet_in(room, self.patterns, width),
+                Ok(true) => place = ready::packet_in(room, self.patterns, self.width),
                 Err(_) => {}
             }
         }
@@ -381,142 +364,6 @@ impl Run {
         true
     }
 
-    /// Takes at most one frame; true if there was work. A frame that the bus can keep is released
-    /// at once, and packed while the next one comes, or when no next one comes in time. Any other
-    /// frame is sent or counted before this call returns.
-    ///
-    /// `may_come` is false if the FPGA does not answer, and after a failed release, when the line
-    /// still signals the frame that was taken before. `release_pending` is set if a release fails.
-    pub fn take_frame(
-        &mut self,
-        now: Micros,
-        mut path: Path<'_>,
-        (may_come, release_pending): (bool, &mut bool),
-        bus: &mut impl FpgaBus,
-        sink: &mut impl PacketSink,
-    ) -> bool {
-        if let Some(width) = self.packets {
-            if bus.streams() {
-                return self.take_streamed(now, path, width, bus, sink);
-            }
-            return may_come
-                && bus.frame_ready()
-                && self.take_packet(now, path, (width, release_pending), bus, sink);
-        }
-        if self.damaged {
-            self.count_damaged(now, path.counters, bus);
-        }
-        let is_due = |since| !self.is_lit() || now.since(since) >= KEPT_PATIENCE;
-        let overdue = self.kept.is_some_and(is_due) || !may_come;
-        let packed = overdue && self.pack_kept(now, &mut path, bus, sink);
-        if !may_come || !bus.frame_ready() {
-            return packed;
-        }
-        let (has_come, sequence) = match bus.frame() {
-            Ok(None) => return packed,
-            Ok(Some(bytes)) => (true, FpgaFrame::parse_header(bytes).map(|found| found.sequence)),
-            Err(_) => (false, None),
-        };
-        // Frames go out in order.
-        self.pack_kept(now, &mut path, bus, sink);
-        // At the end of a run no next frame is worth waiting for.
-        if has_come && self.is_lit() && bus.keep() {
-            self.kept = Some(now);
-            // Its checksum is looked at when it is packed. A frame that comes again, whole or damaged,
-            // is no progress.
-            if sequence.is_some() && ![self.last_sequence, self.last_kept].contains(&sequence) {
-                self.last_frame = now;
-            }
-            self.last_kept = sequence;
-            *release_pending = fpga::release(bus).is_err();
-            return true;
-        }
-        let bytes = if has_come { bus.frame().ok().flatten() } else { None };
-        let taken =
-            bytes.and_then(|bytes| assemble(bytes, self.patterns, (path.meter, now), path.scratch));
-        // The FPGA needs its buffer back before the next frame is complete, so the release comes
-        // before the link.
-        *release_pending = fpga::release(bus).is_err();
-        match taken {
-            Some(taken) => {
-                self.deliver(now, path.counters, path.may_send, taken, sink);
-            }
-            None => self.count_damaged(now, path.counters, bus),
-        }
-        true
-    }
-
-    /// Counts a frame that could not be read.
-    fn count_damaged(&mut self, now: Micros, counters: &mut Counters, bus: &mut impl FpgaBus) {
-        self.damaged = false;
-        if counters.count_corrupt(bus) {
-            self.last_frame = now;
-        }
-    }
-
-    /// Sends or counts the frame that the bus keeps, if any; true if there was one.
-    fn pack_kept(
-        &mut self,
-        now: Micros,
-        path: &mut Path<'_>,
-        bus: &mut impl FpgaBus,
-        sink: &mut impl PacketSink,
-    ) -> bool {
-        if self.kept.is_none() {
-            return false;
-        }
-        let Some(bytes) = bus.kept() else { return false };
-        let Path { counters, meter, scratch, may_send } = path;
-        self.pack(now, Path { counters, meter, scratch, may_send: *may_send }, bytes, sink);
-        if self.damaged {
-            self.count_damaged(now, path.counters, bus);
-        }
-        true
-    }
-
-    /// Sends a kept frame. A damaged one is counted when the FPGA can be asked again.
-    pub fn pack(&mut self, now: Micros, path: Path<'_>, bytes: &[u8], sink: &mut impl PacketSink) {
-        if self.kept.take().is_some() {
-            match assemble(bytes, self.patterns, (path.meter, now), path.scratch) {
-                Some(taken) => {
-                    self.deliver(now, path.counters, path.may_send, taken, sink);
-                }
-                None => self.damaged = true,
-            }
-        }
-    }
-
-    /// Sends or counts a frame that was assembled.
-    #[inline(never)]
-    fn deliver(
-        &mut self,
-        now: Micros,
-        counters: &mut Counters,
-        may_send: bool,
-        (header, samples): (Header, Samples<'_>),
-        sink: &mut impl PacketSink,
-    ) {
-        if self.last_sequence.replace(header.sequence) == Some(header.sequence) {
-            // The bus lost the release of this frame. A frame that comes again is no progress.
-            return;
-        }
-        self.last_frame = now;
-        counters.advance(header.sequence.wrapping_add(1), header.lost);
-        let payload = samples.byte_len().saturating_add(STREAM_HEADER_BYTES);
-        let frame = DeviceMessage::Frame(Frame {
-            run: counters.run,
-            sequence: header.sequence,
-            device_time_us: self.anchor.time_of(header.clock).0,
-            sweeps: header.sweeps,
-            flags: header.flags,
-            samples,
-        });
-        let sent = may_send && send(&frame, payload, sink);
-        let count = if sent { &mut counters.sent } else { &mut counters.dropped };
-        *count = count.wrapping_add(1);
-        counters.reconcile();
-    }
-
     /// Reply and event of a run whose LEDs are off and whose last frame is through; `None` before.
     pub fn wind_up(
         &mut self,
@@ -528,7 +375,7 @@ impl Run {
         let ending = self.ending.as_mut()?;
         if fpga != Fpga::Absent {
             let unknown = fpga == Fpga::MayBeLit || counters.read(bus).is_err();
-            if bus.streams()
+            if self.is_parallel
                 && let Some(last) = self.last_sequence
             {
                 counters.count_gone(last.wrapping_add(1));
@@ -554,21 +401,6 @@ impl Run {
         };
         Some(Ended { reply: ending.reply.take(), event })
     }
-}
-
-/// The header and packed samples of an intact frame with this many patterns, which the meter sees too.
-#[inline(never)]
-pub(crate) fn assemble<'s>(
-    bytes: &[u8],
-    patterns: u16,
-    (meter, now): (&mut Meter, Micros),
-    scratch: &'s mut [u8],
-) -> Option<(Header, Samples<'s>)> {
-    let frame = FpgaFrame::parse(bytes).ok().filter(|frame| frame.header.patterns == patterns)?;
-    meter.compare(&frame, scratch);
-    let samples = Samples::pack(frame.sums().map(|sums| sums.difference()), scratch).ok()?;
-    meter.keep(now, &frame.header, samples.shift());
-    Some((frame.header, samples))
 }
 
 #[cfg(test)]

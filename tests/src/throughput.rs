@@ -15,7 +15,7 @@ use nirspi_wire::host_port::SEALED_BYTES;
 use nirspi_wire::packet::{MAX_HOST_PACKET, unseal};
 use nirspi_wire::register::Register;
 use nirspi_wire::{
-    Command, Configuration, PatternOrder, Request, RunLength, SampleSource, Tail, Version, encode,
+    Command, Configuration, PatternOrder, Request, RunLength, SampleSource, Version, encode,
     version,
 };
 use std::collections::VecDeque;
@@ -287,7 +287,6 @@ pub fn stretch<P: TimedPort>(
     patterns: u16,
     (before, frames): (u32, u32),
     processor: Processor,
-    is_narrow: bool,
 ) -> Stretch {
     let mut buffer = [0; MAX_FRAME_BYTES];
     let mut bus = PortBus::new(Costly { port, processor }, &mut buffer);
@@ -312,7 +311,6 @@ pub fn stretch<P: TimedPort>(
         sweeps: 1,
         source: SampleSource::Detector,
         over_range_trip: 0,
-        narrow: Tail(Some(is_narrow)),
     };
     for command in [
         Command::Hello { protocol: version::CURRENT },

@@ -4,7 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
-use nirspi::link::{Link, Received};
+use nirspi::link::Link;
 use nirspi::recording::{Recording, Target};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
@@ -16,11 +16,7 @@ use nirspi_recon::{Order, Rows, Side, fwht, metrics, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::samples::Width;
-use nirspi_wire::{
-    Command, DeviceMessage, Fault, Frame, FrameFlags, Request, Samples, encode, open, version,
-    walsh,
-};
-use std::io;
+use nirspi_wire::{DeviceMessage, Fault, Frame, FrameFlags, Samples, encode, open, walsh};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
@@ -101,75 +97,17 @@ fn the_scene_comes_through_exactly_in_any_order() {
     }
 }
 
-/// A link whose host never asks for samples of 24 bits: it speaks an earlier protocol version, or the camera does.
-struct Earlier {
-    link: Box<dyn Link>,
-    /// Greetings go on as of this version.
-    version: u16,
-}
-
-impl Link for Earlier {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        let mut bytes = bytes.to_vec();
-        let mut packet = bytes.clone();
+/// The widths of the samples in a recording, frame by frame.
+fn widths(path: &Path) -> Vec<Width> {
+    let width = |mut packet: Vec<u8>| {
         packet.pop();
-        if let Ok(Request { id, command: Command::Hello { .. } }) = open(&mut packet) {
-            let command = Command::Hello { protocol: self.version };
-            bytes = encode(&Request { id, command }, &mut [0; 32]).unwrap().to_vec();
+        match open(&mut packet) {
+            Ok(DeviceMessage::Frame(frame)) => Some(frame.samples.width()),
+            _ => None,
         }
-        self.link.send(&bytes)
-    }
-
-    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
-        self.link.receive(buffer, timeout)
-    }
-}
-
-/// The packets of frames in a recording, and their widths.
-fn frames_of(path: &Path) -> (Vec<Vec<i64>>, Vec<Width>, usize) {
-    let (mut samples, mut widths, mut bytes) = (Vec::new(), Vec::new(), 0);
-    for packet in Recording::open(path).unwrap() {
-        let mut packet = packet.unwrap().bytes;
-        let length = packet.len();
-        packet.pop();
-        if let Ok(DeviceMessage::Frame(frame)) = open(&mut packet) {
-            samples.push(frame.samples.iter().collect());
-            widths.push(frame.samples.width());
-            bytes += length;
-        }
-    }
-    (samples, widths, bytes)
-}
-
-/// Hosts of every version get the same frames, integrals and images from this firmware; hosts of today get them in a
-/// quarter fewer bytes.
-#[test]
-fn captures_of_24_and_of_32_bits_are_the_same_frames() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut seen = Vec::new();
-    for version in version::MIN..=version::CURRENT {
-        let path = folder.path().join(format!("{version}.mcap"));
-        let camera = optics().camera(1).unwrap();
-        let link = Earlier { link: Box::new(MemoryLink::new(camera)), version };
-        let record = Some(Target::New(path.clone()));
-        let captured =
-            run(Box::new(link), &CaptureOptions { record, ..options(&Order::CakeCutting, true) });
-        assert!(captured.counters.is_complete(), "{}", captured.counters);
-        let measured = captured.integrated.measurements(&captured.setup, None, true).unwrap();
-        let tallied = tally_recording(&mut Recording::open(&path).unwrap()).unwrap();
-        assert!(tallied.account().counters().is_complete());
-        let (samples, widths, bytes) = frames_of(&path);
-        assert_eq!(widths.len(), FRAMES as usize);
-        let expected = if version >= Width::NARROW_SINCE { Width::Bits24 } else { Width::Bits32 };
-        assert!(widths.iter().all(|&width| width == expected), "version {version}: {widths:?}");
-        seen.push((samples, measured.values().to_vec(), bytes));
-    }
-    let (newest, older) = seen.split_last().unwrap();
-    for (samples, measured, bytes) in older {
-        assert_eq!((samples, measured), (&newest.0, &newest.1));
-        println!("{FRAMES} frames: {bytes} bytes with 32 bits, {} with 24", newest.2);
-        assert!(newest.2 * 100 < bytes * 77);
-    }
+    };
+    let packets = Recording::open(path).unwrap();
+    packets.filter_map(|packet| width(packet.unwrap().bytes)).collect()
 }
 
 /// Sums of 171 sweeps of three samples can leave 24 bits.
@@ -183,7 +121,7 @@ fn a_capture_whose_samples_can_leave_24_bits_has_samples_of_32() {
         options.setup.sweeps = sweeps;
         options.record = Some(Target::New(path.clone()));
         assert!(run(ideal_link(), &options).counters.is_complete());
-        assert_eq!(frames_of(&path).1, [expected; FRAMES as usize]);
+        assert_eq!(widths(&path), [expected; FRAMES as usize]);
     }
 }
 
@@ -325,7 +263,7 @@ fn an_intact_frame_of_another_setup_is_corrupt() {
     let captured = run(ideal_link(), &options(&Order::CakeCutting, false));
     let mut tally = Tally::new(&captured.setup, None);
     let frame = |sequence, words: usize, buffer: &mut [u8]| {
-        let samples = Samples::pack(vec![1i64; words].into_iter(), buffer).unwrap();
+        let samples = Samples::pack(vec![1i64; words].into_iter(), Width::Bits32, buffer).unwrap();
         let (run, flags) = (0, FrameFlags::DIFFERENTIAL);
         let frame = Frame { run, sequence, device_time_us: 0, sweeps: 1, flags, samples };
         let mut packet = vec![0; MAX_DEVICE_PACKET + 1];

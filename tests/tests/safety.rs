@@ -8,7 +8,7 @@ use nirspi_optics::Scene;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
     Command, Configuration, Deframed, Deframer, DeviceMessage, EventKind, Fault, PatternOrder,
-    Refusal, Reply, Request, RunLength, SampleSource, Tail, encode, open, version,
+    Refusal, Reply, Request, RunLength, SampleSource, encode, open, version,
 };
 
 /// 8 us, the step of the virtual camera.
@@ -87,7 +87,6 @@ impl Bench {
             sweeps: 1,
             source: SampleSource::Detector,
             over_range_trip: 0,
-            narrow: Tail(None),
         }))
     }
 

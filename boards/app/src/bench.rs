@@ -11,8 +11,8 @@ use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
 use nirspi_wire::register::{IDENTITY, Register, control, mode, status};
 use nirspi_wire::{
-    Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource, Tail,
-    encode, ready,
+    Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource, encode,
+    ready,
 };
 use std::rc::Rc;
 use std::vec::Vec;
@@ -96,7 +96,6 @@ pub struct Pins {
 impl Default for Pins {
     fn default() -> Self {
         Self {
-            version: Cell::new(Register::Version.reset()),
             leds_enabled: Cell::default(),
             lamps: Cell::default(),
             running: Cell::default(),
@@ -255,7 +254,7 @@ impl HostPort for FakeFpga {
         let running = if self.pins.running.get() { status::RUNNING | status::LEDS_ON } else { 0 };
         let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
-            Some(Register::Version) => self.pins.version.get(),
+            Some(Register::Version) => Register::Version.reset(),
             Some(Register::Design) => Register::Design.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             // The frame that is ready is made already.
@@ -322,10 +321,13 @@ fn frame_packet(run: u16, sequence: u32, patterns: u16) -> Vec<u8> {
         sweeps: 1,
         flags: FrameFlags::DIFFERENTIAL,
         patterns,
-        width: nirspi_wire::samples::Width::Bits32,
+        width: nirspi_wire::samples::Width::Bits24,
     };
     let mut payload = head.to_bytes().to_vec();
-    payload.extend((0..i32::from(patterns)).flat_map(|k| (93 + k).to_le_bytes()));
+    payload.extend((0..i32::from(patterns)).flat_map(|k| {
+        let [low, middle, high, _] = (93 + k).to_le_bytes();
+        [low, middle, high]
+    }));
     let mut room = std::vec![0; payload.len() + payload.len() / 254 + 8];
     seal_packet(&payload, &mut room).expect("a packet has room").to_vec()
 }
@@ -336,25 +338,7 @@ impl FpgaPort for FakeFpga {
             embassy_futures::yield_now().await;
         }
         let patterns = self.registers[usize::from(Register::Patterns.address())] as u16;
-        if self.registers[usize::from(Register::Mode.address())] & mode::PACKETS != 0 {
-            self.packet(patterns, into);
-            return Ok(());
-        }
-        let header = Header {
-            patterns,
-            flags: FrameFlags::DIFFERENTIAL,
-            sequence: self.pins.sequence.get(),
-            sweeps: 1,
-            over_range: 0,
-            lost: 0,
-            clock: 0,
-        };
-        let mut bytes = header.to_bytes().to_vec();
-        for k in 0..u64::from(patterns) {
-            bytes.extend(Sums { positive: 100 + k, negative: 7 }.to_bytes());
-        }
-        bytes.extend(nirspi_wire::crc32(&bytes).to_le_bytes());
-        into.copy_from_slice(&bytes);
+        self.packet(patterns, into);
         Ok(())
     }
 
@@ -378,7 +362,6 @@ pub fn configuration(patterns: u16) -> Configuration<'static> {
         sweeps: 1,
         source: SampleSource::Detector,
         over_range_trip: 0,
-        narrow: Tail(None),
     }
 }
 

@@ -1,14 +1,12 @@
 //! The camera's loop.
 //!
 //! One turn of the loop takes at most a millisecond, or the transfer of the longest frame. A packet of
-//! the FPGA goes straight into the link's memory. Of older gateware, the camera packs the frame before
-//! during a transfer, if the board has memory for two. While the loop waits, the tasks that serve the host
+//! the FPGA goes straight into the link's memory. While the loop waits, the tasks that serve the host
 //! run.
 
 use crate::link::CameraEnd;
 use crate::{Board, DEPTH_SIDE, DepthMap, DepthSensor, FpgaPort};
-use core::future::{Future, pending, poll_fn};
-use core::pin::pin;
+use core::future::pending;
 use embassy_futures::select::select3;
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
@@ -38,8 +36,6 @@ pub struct Device<'b, B, P, G> {
     pub port: P,
     /// Memory for one frame, where the port's DMA can reach it.
     pub frame: &'b mut [u8; MAX_FRAME_BYTES],
-    /// The same for a second frame: with it a frame is packed while the next one is transferred.
-    pub spare: Option<&'b mut [u8; MAX_FRAME_BYTES]>,
     /// The destination of bitstreams.
     pub loader: G,
     /// Identity of the device, from [`board_info`].
@@ -82,8 +78,8 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
     mut link: CameraEnd<'_>,
     depth: &DepthMailbox,
 ) -> ! {
-    let Device { mut board, port, frame, spare, mut loader, info, limits, crash } = device;
-    let mut bus = PortBus::new(port, frame).with_spare(spare);
+    let Device { mut board, port, frame, mut loader, info, limits, crash } = device;
+    let mut bus = PortBus::new(port, frame);
     let mut camera = Camera::new(info, limits);
     if let Some(crash) = crash {
         camera.restarted_after(crash);
@@ -125,41 +121,20 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
         match bus.wanted() {
             Some(Wanted { port, opcode, into }) => {
                 let (_, sink) = link.both();
-                // The link either gives the room, or takes the frame that is packed meanwhile.
-                let (bytes, kept) = match into {
-                    Target::Bus { bytes, kept } => (Some(bytes), kept.map(|kept| (kept, sink))),
-                    Target::Link(length) => (sink.claim(length), None),
+                let bytes = match into {
+                    Target::Bus(bytes) => Some(bytes),
+                    Target::Link(length) => sink.claim(length),
                 };
                 if let Some(bytes) = bytes {
-                    let pack = || {
-                        if let Some((frame, sink)) = kept {
-                            camera.pack(now(), frame, sink);
-                        }
-                    };
-                    let done = during(port.read_bytes(opcode, bytes), pack).await;
+                    let done = port.read_bytes(opcode, bytes).await;
                     bus.transferred(done);
                 }
-                let (_, sink) = link.both();
                 camera.forward(now(), &mut Ports { bus: &mut bus, sink, loader: &mut loader });
             }
             None if progress.worked || taken > 0 => yield_now().await,
             None => rest(&mut bus, &mut link).await,
         }
     }
-}
-
-/// Waits for a transfer. `work` runs once, when the transfer has begun.
-async fn during<T>(transfer: impl Future<Output = T>, work: impl FnOnce()) -> T {
-    let mut transfer = pin!(transfer);
-    let mut work = Some(work);
-    poll_fn(|context| {
-        let polled = transfer.as_mut().poll(context);
-        if let Some(work) = work.take() {
-            work();
-        }
-        polled
-    })
-    .await
 }
 
 /// Sleeps until there may be work.

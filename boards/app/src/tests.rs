@@ -23,8 +23,6 @@ const TRANSFER: usize = 64;
 const PATTERNS: u16 = 2;
 /// So many bytes go out where they lie.
 const LONGEST: usize = 4 * TRANSFER;
-/// Gateware that makes no packets.
-const OLDER: u32 = 0x0000_0300;
 
 /// A running board, and the task that serves its host.
 struct Bench {
@@ -37,20 +35,13 @@ struct Bench {
 
 impl Bench {
     fn new(places: usize) -> Self {
-        Self::with_gateware(places, Register::Version.reset())
-    }
-
-    /// A board whose FPGA has gateware of this version.
-    fn with_gateware(places: usize, version: u32) -> Self {
         let pins: Rc<Pins> = Rc::default();
-        pins.version.set(version);
         let link = Box::leak(Box::new(Link::new(std::vec![Packet::EMPTY; places].leak())));
         let (camera_end, from_host, to_host) = link.split();
         let device = Device {
             board: FakeBoard(Rc::clone(&pins)),
             port: FakeFpga::new(Rc::clone(&pins)),
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
-            spare: Some(Box::leak(Box::new([0; MAX_FRAME_BYTES]))),
             loader: FakeLoader(Rc::clone(&pins)),
             info: board_info("bench", "0001"),
             limits: Limits::default(),
@@ -195,40 +186,30 @@ fn the_first_of_two_crashes_is_kept_until_it_is_taken() {
 
 #[test]
 fn frames_come_in_order_and_a_full_link_drops_whole_ones() {
-    for version in [OLDER, Register::Version.reset()] {
-        let mut bench = Bench::with_gateware(4, version);
-        for (id, command) in [
-            (1, Command::Hello { protocol: version::CURRENT }),
-            (2, Command::Configure(configuration(PATTERNS))),
-            (3, Command::Start(RunLength::Continuous)),
-        ] {
-            bench.send(&packet(id, command));
-            bench.turn();
-            bench.heard();
-        }
-        let next = bench.pins.sequence.get();
-        for _ in 0..10 {
-            bench.turn();
-        }
-        // The host has taken no packet: four packets wait, and the other frames were dropped.
-        let heard = bench.heard();
-        // Older gateware has its buffer back before the frame is packed.
-        let first = next - u32::from(version == OLDER);
-        let expected: Vec<Heard> = (0..4).map(|k| Heard::Frame(first + k)).collect();
-        assert_eq!(heard, expected);
-        assert!(bench.pins.sequence.get() > next + 10);
+    let mut bench = Bench::new(4);
+    for (id, command) in [
+        (1, Command::Hello { protocol: version::CURRENT }),
+        (2, Command::Configure(configuration(PATTERNS))),
+        (3, Command::Start(RunLength::Continuous)),
+    ] {
+        bench.send(&packet(id, command));
+        bench.turn();
+        bench.heard();
     }
+    let next = bench.pins.sequence.get();
+    for _ in 0..10 {
+        bench.turn();
+    }
+    // The host has taken no packet: four packets wait, and the other frames were dropped.
+    let heard = bench.heard();
+    let expected: Vec<Heard> = (0..4).map(|k| Heard::Frame(next + k)).collect();
+    assert_eq!(heard, expected);
+    assert!(bench.pins.sequence.get() > next + 10);
 }
 
 #[test]
 fn a_long_transfer_delays_the_answer_and_loses_nothing() {
-    for version in [OLDER, Register::Version.reset()] {
-        delay_the_answer(version);
-    }
-}
-
-fn delay_the_answer(version: u32) {
-    let mut bench = Bench::with_gateware(64, version);
+    let mut bench = Bench::new(64);
     for (id, command) in [
         (1, Command::Hello { protocol: version::CURRENT }),
         (2, Command::Configure(configuration(PATTERNS))),

@@ -121,14 +121,11 @@ impl Board for Emulated {
 async fn camera(board: Emulated, link: CameraEnd<'static>) -> ! {
     static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
         ConstStaticCell::new([0; MAX_FRAME_BYTES]);
-    static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> =
-        ConstStaticCell::new([0; MAX_FRAME_BYTES]);
     static DEPTH: StaticCell<DepthMailbox> = StaticCell::new();
     let device = Device {
         port: Tunnel::new(&FPGA, board.lines),
         board,
         frame: FRAME.take(),
-        spare: Some(SPARE.take()),
         loader: NoLoader,
         info: board_info("mps2-an505", "QEMU"),
         limits: Limits::default(),

@@ -156,8 +156,6 @@ async fn main(spawner: Spawner) {
         board,
         port,
         frame: FRAME.take(),
-        // The bitstream's staging memory leaves no room for a second frame.
-        spare: None,
         loader: gateware::Loader::new(configuration, STAGING.take()),
         info,
         limits: Limits::default(),

@@ -64,7 +64,6 @@ uncleared! { PACKETS: [Packet; PLACES], PACKETS_TAKEN }
 static LINK: StaticCell<Link<'static>> = StaticCell::new();
 static MAILBOX: StaticCell<DepthMailbox> = StaticCell::new();
 static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
-static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
 uncleared! { STAGING: [u8; configuration::STAGING_BYTES], STAGING_TAKEN }
 static PRESENCE: StaticCell<Presence> = StaticCell::new();
 static USB_MEMORY: StaticCell<Memory> = StaticCell::new();
@@ -205,7 +204,6 @@ async fn main(spawner: Spawner) {
         board,
         port,
         frame: FRAME.take(),
-        spare: Some(SPARE.take()),
         loader: gateware::Loader::new(configuration, STAGING.fill(&STAGING_TAKEN, 0)),
         info,
         limits: Limits::default(),

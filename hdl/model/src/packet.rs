@@ -83,15 +83,11 @@ mod tests {
                 sums.iter().map(|&(p, n)| Sums { positive: p.min(most), negative: n.min(most) }).collect();
             let mut bytes = packet(&header, &bank, &Stamp { run, clock, time_us }, width);
 
-            // As `mcu/src/packets.rs` does it.
             let differences = bank.iter().map(|sums| {
                 Sums { negative: if differential { sums.negative } else { 0 }, ..*sums }.difference()
             });
             let mut words = vec![0; 4 * bank.len()];
-            let samples = match width {
-                Width::Bits32 => Samples::pack(differences, &mut words).unwrap(),
-                Width::Bits24 => Samples::pack_narrow(differences, &mut words).unwrap(),
-            };
+            let samples = Samples::pack(differences, width, &mut words).unwrap();
             let device_time_us = time_us + later / 125;
             let frame = Frame { run, sequence, device_time_us, sweeps, flags, samples };
             let length = bytes.len() - 1;

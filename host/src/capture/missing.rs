@@ -111,9 +111,9 @@ mod tests {
 
     fn camera() -> CameraIdentity {
         CameraIdentity {
-            protocol: 4,
+            protocol: 1,
             firmware: "0.1.0".into(),
-            gateware: "0.3.2".into(),
+            gateware: "0.4.0".into(),
             board: "virtual".into(),
             serial: "virtual-1".into(),
             adc_hz: 125_000_000,

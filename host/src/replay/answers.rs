@@ -4,8 +4,7 @@ use super::Recorded;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{
-    Capabilities, ConfigField, ConfigProblem, Configuration, Identity, SIDE, State, Status, Tail,
-    Version,
+    Capabilities, ConfigField, ConfigProblem, Configuration, Identity, SIDE, State, Status, Version,
 };
 
 /// The identity of the recorded camera in the wire's form.
@@ -13,7 +12,6 @@ pub(super) fn identity(camera: &CameraIdentity) -> Identity<'_> {
     let has = |name: &str| camera.capabilities.iter().any(|word| word == name);
     let known = Capabilities::NAMES.iter().filter(|(_, name)| has(name)).map(|&(known, _)| known);
     let capabilities = known.fold(Capabilities::default(), Capabilities::with);
-    let is_newer = camera.protocol >= Capabilities::SINCE;
     Identity {
         protocol: camera.protocol,
         firmware: version(&camera.firmware),
@@ -24,7 +22,7 @@ pub(super) fn identity(camera: &CameraIdentity) -> Identity<'_> {
         adc_hz: camera.adc_hz,
         adc_bits: camera.adc_bits,
         wavelength_nm: camera.wavelength_nm,
-        capabilities: Tail(is_newer.then_some(capabilities)),
+        capabilities,
     }
 }
 
@@ -52,7 +50,7 @@ pub(super) fn status(run: u16) -> Status {
         duty_permille: 0,
         leds_on: false,
         interlock_closed: true,
-        signal: Tail(None),
+        signal: None,
     }
 }
 
@@ -75,8 +73,6 @@ pub(super) fn misfit(asked: &Configuration<'_>, recorded: &Recorded) -> Option<C
     if let Some((field, found, recorded)) = other {
         return Some(ConfigProblem::OutOfRange { field, found, min: recorded, max: recorded });
     }
-    // The packets are played back as they were recorded, whichever width the host asks for.
-    let asked = Configuration { narrow: Tail(None), ..*asked };
-    let same = recorded.setup.with_configuration(|mine| mine == asked);
+    let same = recorded.setup.with_configuration(|mine| mine == *asked);
     (!same).then_some(ConfigProblem::OrderEntry { index: 0, found: 0 })
 }

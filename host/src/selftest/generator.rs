@@ -8,7 +8,7 @@ use super::check::{Check, Limit};
 use super::stream::{Shot, shots};
 use crate::session::{Session, SessionError};
 use nirspi_wire::register::{TEST_SEED, test_sample};
-use nirspi_wire::{CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource, Tail};
+use nirspi_wire::{CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource};
 
 /// Name of the check.
 pub const NAME: &str = "test frames through the whole chain";
@@ -29,7 +29,6 @@ const SETTINGS: [Configuration<'static>; 2] = [
         sweeps: 25,
         source: SampleSource::TestPattern,
         over_range_trip: 0,
-        narrow: Tail(None),
     },
     Configuration {
         order: PatternOrder::Sequency,
@@ -41,7 +40,6 @@ const SETTINGS: [Configuration<'static>; 2] = [
         sweeps: 36,
         source: SampleSource::TestPattern,
         over_range_trip: 0,
-        narrow: Tail(None),
     },
 ];
 

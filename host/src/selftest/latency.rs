@@ -12,7 +12,7 @@ use super::stream::shots;
 use crate::calibration::{HALF_PERIOD, ONSET, Settling};
 use crate::session::{Session, SessionError};
 use nirspi_wire::register::LATENCY_MAX;
-use nirspi_wire::{Configuration, PatternOrder, SampleSource, Tail};
+use nirspi_wire::{Configuration, PatternOrder, SampleSource};
 
 /// Name of the check.
 pub const NAME: &str = "ADC latency by stepping";
@@ -47,7 +47,6 @@ pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, Sess
             sweeps: SWEEPS,
             source: SampleSource::Detector,
             over_range_trip: 0,
-            narrow: Tail(None),
         };
         let found = shots(session, configuration, FRAMES)?;
         let Some(sample) = found.first().and_then(|shot| shot.samples.first()) else {

@@ -15,7 +15,7 @@ use super::check::{Check, Limit};
 use super::stream::shots;
 use crate::session::{Session, SessionError};
 use nirspi_recon::{FwhtLengthError, fwht};
-use nirspi_wire::{Configuration, PATTERNS, PatternOrder, SIDE, SampleSource, Tail};
+use nirspi_wire::{Configuration, PATTERNS, PatternOrder, SIDE, SampleSource};
 use std::fmt;
 
 /// Name of the check of the lines.
@@ -51,7 +51,6 @@ fn configuration(differential: bool, adc_latency: u8) -> Configuration<'static> 
         sweeps: SWEEPS,
         source: SampleSource::Detector,
         over_range_trip: 0,
-        narrow: Tail(None),
     }
 }
 

@@ -8,6 +8,7 @@ use crate::session::{Session, SessionError};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{Rows, Side};
 use nirspi_wire::CLOCKS_PER_PATTERN;
+use nirspi_wire::ready::MAX_SUMMED_SAMPLES;
 
 /// Name of the check of the losses.
 pub const LOSSES: &str = "link losses";
@@ -17,13 +18,16 @@ pub const SPEED: &str = "link throughput";
 /// Share of its top speed at which a link must lose no frame.
 const PACE: f64 = 0.8;
 
+/// Samples left out at the start of each pattern.
+const BLANKED: u16 = 2;
+
 fn setup(sweeps: u32) -> MeasurementSetup {
     MeasurementSetup {
         order: "natural".to_owned(),
         rows: Rows::natural(Side::INSTRUMENT),
         differential: true,
         clocks_per_pattern: CLOCKS_PER_PATTERN,
-        blanked: 2,
+        blanked: BLANKED,
         adc_latency: 0,
         sweeps,
     }
@@ -50,6 +54,7 @@ pub fn check(session: &mut Session, demands: LinkDemands) -> Result<Vec<Check>, 
 
     let sweeps_per_s = 1e9 / setup(1).frame_ns();
     let sweeps = (sweeps_per_s / (PACE * frames_per_s)).ceil().max(1.0) as u32;
+    let sweeps = sweeps.min(MAX_SUMMED_SAMPLES / u32::from(CLOCKS_PER_PATTERN - BLANKED));
     let paced = stream(session, &setup(sweeps), demands.duration)?;
     let counters = paced.tally.account().counters();
     let missing = counters.total() - counters.received;

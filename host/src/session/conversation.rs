@@ -11,8 +11,8 @@ use nirspi_wire::packet::{
     MAX_DEVICE_PACKET, MAX_HOST_PACKET, hello_of_any_version, parse, unseal,
 };
 use nirspi_wire::{
-    Answer, Command, Configuration, Deframed, Deframer, DeviceMessage, PacketError, Refusal, Reply,
-    Tail, encode, version,
+    Answer, Command, Deframed, Deframer, DeviceMessage, PacketError, Refusal, Reply, encode,
+    version,
 };
 use std::time::Duration;
 
@@ -29,8 +29,6 @@ pub(super) struct Conversation {
     next_id: u16,
     /// Time spent in waiting for the link.
     waited: Duration,
-    /// Whether the camera is asked for samples of 24 bits.
-    asks_narrow: bool,
 }
 
 impl Conversation {
@@ -38,12 +36,7 @@ impl Conversation {
     pub(super) fn begin(mut link: Box<dyn Link>) -> Result<Self, SessionError> {
         link.send(&[0])?;
         let (incoming, waited) = (Incoming::new(), Duration::ZERO);
-        Ok(Self { link, incoming, next_id: 0, waited, asks_narrow: false })
-    }
-
-    /// From now on a configuration that says nothing about it asks for samples of 24 bits.
-    pub(super) fn ask_narrow(&mut self) {
-        self.asks_narrow = true;
+        Ok(Self { link, incoming, next_id: 0, waited })
     }
 
     /// Time that the link has been waited for.
@@ -53,12 +46,7 @@ impl Conversation {
 
     /// Sends a command without waiting for its answer. Returns the number that the answer will
     /// repeat.
-    pub(super) fn send(&mut self, mut command: Command<'_>) -> Result<u16, SessionError> {
-        if let Command::Configure(Configuration { narrow, .. }) = &mut command
-            && self.asks_narrow
-        {
-            *narrow = Tail(narrow.0.or(Some(true)));
-        }
+    pub(super) fn send(&mut self, command: Command<'_>) -> Result<u16, SessionError> {
         let id = self.next_id;
         self.next_id = id.wrapping_add(1);
         let mut packet = vec![0; MAX_HOST_PACKET];

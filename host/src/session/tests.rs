@@ -2,12 +2,10 @@
 
 use super::*;
 use crate::link::Received;
-use crate::setup::MeasurementSetup;
-use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
-    Answer, Capabilities, Configuration, CrashReport, Event, EventKind, Fault, Refusal, Reply,
-    State, Tail, Version, encode,
+    Answer, Capabilities, CrashReport, Event, EventKind, Fault, Refusal, Reply, State, Version,
+    encode,
 };
 use std::io;
 
@@ -47,7 +45,7 @@ const IDENTITY: Identity<'static> = Identity {
     adc_hz: 0,
     adc_bits: 14,
     wavelength_nm: 1550,
-    capabilities: Tail(Some(Capabilities::DEPTH)),
+    capabilities: Capabilities::DEPTH,
 };
 
 const STATUS: Status = Status {
@@ -65,7 +63,7 @@ const STATUS: Status = Status {
     duty_permille: 0,
     leds_on: false,
     interlock_closed: true,
-    signal: Tail(None),
+    signal: None,
 };
 
 fn reply(id: u16, answer: Answer<'_>) -> Vec<u8> {
@@ -167,76 +165,6 @@ fn a_camera_that_has_ended_the_session_is_not_taken_for_one_of_another_version()
     assert!(matches!(foreign, SessionError::Version { .. }), "{foreign}");
 }
 
-/// A camera with fixed answers that keeps the bytes it receives.
-struct Heard {
-    answers: Scripted,
-    requests: std::sync::Arc<std::sync::Mutex<Vec<u8>>>,
-}
-
-impl Link for Heard {
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.requests.lock().unwrap().extend_from_slice(bytes);
-        Ok(())
-    }
-    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
-        self.answers.receive(buffer, timeout)
-    }
-}
-
-#[test]
-fn an_older_camera_is_greeted_again_in_its_own_version() {
-    // Firmware of version 1 names its own version, whatever version the host sends, and has no
-    // tail.
-    let old = Identity { protocol: 1, capabilities: Tail(None), ..IDENTITY };
-    let answers = vec![reply(0, Answer::Hello(old)), reply(1, Answer::Hello(old))];
-    let requests = std::sync::Arc::default();
-    let link = Heard { answers: Scripted(answers), requests: std::sync::Arc::clone(&requests) };
-    let session = Session::open(Box::new(link)).unwrap();
-    assert_eq!(session.identity().protocol, 1);
-    assert!(session.identity().capabilities.is_empty());
-    let hello = |id, protocol| {
-        let mut room = [0; 32];
-        let command = Command::Hello { protocol };
-        encode(&nirspi_wire::Request { id, command }, &mut room).unwrap().to_vec()
-    };
-    let expected = [vec![0], hello(0, version::CURRENT), hello(1, 1)].concat();
-    assert_eq!(*requests.lock().unwrap(), expected);
-}
-
-/// What a host sends to a camera with these capabilities that it asks to measure in this way.
-fn configured(capabilities: Capabilities, narrow: Option<bool>) -> Tail<bool> {
-    let camera = Identity { capabilities: Tail(Some(capabilities)), ..IDENTITY };
-    let answers = vec![reply(0, Answer::Hello(camera)), reply(1, Answer::Done)];
-    let requests = std::sync::Arc::default();
-    let link = Heard { answers: Scripted(answers), requests: std::sync::Arc::clone(&requests) };
-    let mut session = Session::open(Box::new(link)).unwrap();
-    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-    setup
-        .with_configuration(|configuration| {
-            let configuration = Configuration { narrow: Tail(narrow), ..configuration };
-            session.command(request::Configure(configuration), &mut IgnorePackets)
-        })
-        .unwrap();
-    let mut sent = requests.lock().unwrap().clone();
-    // Nothing, the greeting, the configuration.
-    let mut packets: Vec<&mut [u8]> = sent.split_mut(|&byte| byte == 0).collect();
-    assert_eq!(packets.len(), 4);
-    let request: nirspi_wire::Request<'_> = nirspi_wire::open(packets[2]).unwrap();
-    let Command::Configure(Configuration { narrow, .. }) = request.command else {
-        panic!("{request:?}");
-    };
-    narrow
-}
-
-#[test]
-fn a_camera_that_has_samples_of_24_bits_is_asked_for_them_and_no_other_is() {
-    let able = Capabilities::NARROW_SAMPLES.with(Capabilities::DEPTH);
-    assert_eq!(configured(able, None), Tail(Some(true)));
-    assert_eq!(configured(able, Some(false)), Tail(Some(false)), "what a caller says stays");
-    // Firmware of an earlier version gets the bytes of an earlier version.
-    assert_eq!(configured(Capabilities::DEPTH, None), Tail(None));
-}
-
 #[test]
 fn a_camera_that_no_longer_speaks_our_version_says_what_to_update() {
     let new = Identity { protocol: version::CURRENT + 1, ..IDENTITY };
@@ -248,7 +176,7 @@ fn a_camera_that_no_longer_speaks_our_version_says_what_to_update() {
 
 #[test]
 fn what_a_camera_can_do_is_named() {
-    let capabilities = Tail(Some(Capabilities(Capabilities::DEPTH.0 | 1 << 31)));
+    let capabilities = Capabilities(Capabilities::DEPTH.0 | 1 << 31);
     let identity = CameraIdentity::from(&Identity { capabilities, ..IDENTITY });
     assert_eq!(identity.capabilities, ["depth", "capability 31"]);
 }

@@ -2,26 +2,23 @@
 //!
 //! The simulator computes some hundred frames a second; the instrument makes up to 24 414. This
 //! FPGA simulates the first frames of a run once. The frames are then repeated as fast as the
-//! firmware takes them, each with its own sequence number, clock and checksum. To firmware logic,
+//! firmware takes them, each in a packet with its own sequence number, time and checksum. To firmware logic,
 //! protocol, link and host, the camera runs at full speed. Registers and raw bursts come from the
 //! model.
-//!
-//! This FPGA says that it is gateware 0.3.0, which makes no packets: a packet's new sequence number and time
-//! would move the bytes of its COBS code, so that each repetition would be encoded anew, which is the work that
-//! packets are to save.
 
 use super::fpga::SimulatedFpga;
-use nirspi_mcu::{BusError, FpgaBus};
-use nirspi_wire::crc32;
-use nirspi_wire::fpga::{CRC_BYTES, FpgaFrame, HEADER_BYTES, Header};
-use nirspi_wire::register::{Register, control, status};
-
-/// Version 0.3.0 of the gateware.
-const NO_PACKETS: u32 = 0x0000_0300;
+use nirspi_mcu::{BusError, CLOCKS_PER_MICRO, FpgaBus};
+use nirspi_wire::packet::{MAX_DEVICE_PACKET, parse, seal, unseal};
+use nirspi_wire::ready::{HEADER_BYTES, Head};
+use nirspi_wire::register::{Register, control, mode, status};
+use nirspi_wire::{DeviceMessage, Frame};
 
 /// Clocks of the model that one start computes at most: 0.13 s of the camera's time. The server
 /// answers no host meanwhile.
 const PATIENCE_CLOCKS: u64 = 1 << 24;
+
+/// What the signal meter asks the FPGA for while a frame is delivered.
+const MEASURES: [Register; 3] = [Register::SumLow, Register::SumHigh, Register::OverRange];
 
 /// An FPGA that repeats its first frames. Frames that take longer than 0.13 s of the camera's time are not
 /// repeated: the model then makes each of them.
@@ -36,17 +33,39 @@ pub struct PrecomputedFpga<F> {
 
 /// A run of repeated frames.
 struct Run {
-    /// The computed frames.
-    frames: Vec<Vec<u8>>,
+    computed: Vec<Computed>,
     frame_clocks: u64,
     /// Sequence number of the offered frame.
     sequence: u32,
     /// Number of frames of the run; 0 means until stopped.
     length: u32,
     ended: bool,
-    first_clock: u64,
-    /// Whether the offered frame already contains the sequence number.
-    stamped: bool,
+    /// The packet of the offered frame, once it has been asked for.
+    packet: Option<usize>,
+    room: Box<[u8; MAX_DEVICE_PACKET]>,
+}
+
+/// A frame that the model has made.
+struct Computed {
+    /// The head of its packet.
+    head: Head,
+    /// The message of its packet.
+    payload: Vec<u8>,
+    /// The values of [`MEASURES`].
+    measures: [u32; 3],
+}
+
+impl Computed {
+    /// `None`: the bytes are no packet of a frame.
+    fn of(packet: &[u8], measures: [u32; 3]) -> Option<Self> {
+        let mut encoded = packet.strip_suffix(&[0])?.to_vec();
+        let payload = unseal(&mut encoded).ok()?.to_vec();
+        let Ok(DeviceMessage::Frame(frame)) = parse(&payload) else { return None };
+        let Frame { run, sequence, device_time_us, sweeps, flags, samples } = frame;
+        let (patterns, width) = (u16::try_from(samples.len()).ok()?, samples.width());
+        let head = Head { run, sequence, device_time_us, sweeps, flags, patterns, width };
+        Some(Self { head, payload, measures })
+    }
 }
 
 impl Run {
@@ -55,29 +74,28 @@ impl Run {
     }
 
     fn slot(&self) -> usize {
-        self.sequence as usize % self.frames.len()
+        self.sequence as usize % self.computed.len()
     }
 
-    /// The offered frame, with header and checksum of this repetition.
-    fn stamp(&mut self) -> Option<&[u8]> {
-        let (slot, sequence) = (self.slot(), self.sequence);
-        let clock = self.first_clock + u64::from(sequence) * self.frame_clocks;
-        let frame = self.frames.get_mut(slot)?;
-        if !self.stamped {
-            stamp(frame, sequence, clock)?;
-            self.stamped = true;
-        }
-        Some(frame)
+    /// The packet of the offered frame, with number, time and checksum of this repetition.
+    fn packet(&mut self) -> Option<&[u8]> {
+        let length = match self.packet {
+            Some(length) => length,
+            None => {
+                let sequence = self.sequence;
+                let passed_us = u64::from(sequence) * self.frame_clocks / CLOCKS_PER_MICRO;
+                let device_time_us = self.computed.first()?.head.device_time_us + passed_us;
+                let slot = self.slot();
+                let Computed { head, payload, .. } = self.computed.get_mut(slot)?;
+                let head = Head { sequence, device_time_us, ..*head };
+                payload.get_mut(..HEADER_BYTES)?.copy_from_slice(&head.to_bytes());
+                let length = seal(payload, &mut self.room[..]).ok()?.len();
+                self.packet = Some(length);
+                length
+            }
+        };
+        self.room.get(..length)
     }
-}
-
-/// Writes header and checksum into a frame.
-fn stamp(frame: &mut [u8], sequence: u32, clock: u64) -> Option<()> {
-    let header = Header { sequence, lost: 0, clock, ..FpgaFrame::parse_header(frame)? };
-    frame.get_mut(..HEADER_BYTES)?.copy_from_slice(&header.to_bytes());
-    let (covered, crc) = frame.split_last_chunk_mut::<CRC_BYTES>()?;
-    *crc = crc32(covered).to_le_bytes();
-    Some(())
 }
 
 impl<F: SimulatedFpga> PrecomputedFpga<F> {
@@ -93,47 +111,49 @@ impl<F: SimulatedFpga> PrecomputedFpga<F> {
         let length = self.model.read(Register::Frames.address())?;
         self.model.write(Register::Frames.address(), 0)?;
         self.model.write(Register::Control.address(), control::START)?;
-        let first_clock = self.clock();
         let begun = self.model.clock();
-        let mut frames = Vec::new();
-        while frames.len() < self.count
+        let mut computed = Vec::new();
+        while computed.len() < self.count
             && self.model.read(Register::Status.address())? & status::RUNNING != 0
             && self.model.clock() - begun < PATIENCE_CLOCKS
         {
             self.model.advance(64);
             if self.model.frame_ready() {
-                frames.extend(self.model.frame()?.map(<[u8]>::to_vec));
+                let mut measures = [0; 3];
+                for (measure, register) in measures.iter_mut().zip(MEASURES) {
+                    *measure = self.model.read(register.address())?;
+                }
+                computed
+                    .extend(self.model.frame()?.and_then(|frame| Computed::of(frame, measures)));
                 self.model.write(Register::Control.address(), control::RELEASE)?;
             }
         }
         self.model.write(Register::Control.address(), control::STOP)?;
         self.model.write(Register::Frames.address(), length)?;
         self.run = None;
-        if frames.is_empty() && self.model.clock() - begun >= PATIENCE_CLOCKS {
+        if computed.is_empty() && self.model.clock() - begun >= PATIENCE_CLOCKS {
             return self.model.write(Register::Control.address(), control::START);
         }
-        if let Some(frame_clocks) = frame_clocks(&frames) {
+        if !computed.is_empty() {
             self.run = Some(Run {
-                frames,
-                frame_clocks,
+                computed,
+                frame_clocks: self.frame_clocks()?,
                 sequence: 0,
                 length,
                 ended: false,
-                first_clock,
-                stamped: false,
+                packet: None,
+                room: Box::new([0; MAX_DEVICE_PACKET]),
             });
         }
         Ok(())
     }
-}
 
-/// Clocks from one frame to the next in a sequence of frames.
-fn frame_clocks(frames: &[Vec<u8>]) -> Option<u64> {
-    let clock = |made: &[u8]| Some(FpgaFrame::parse_header(made)?.clock);
-    match frames {
-        [] => None,
-        [_] => Some(0),
-        [first, second, ..] => Some(clock(second)? - clock(first)?),
+    /// Clocks from one frame to the next.
+    fn frame_clocks(&mut self) -> Result<u64, BusError> {
+        let mut setting = |register: Register| self.model.read(register.address()).map(u64::from);
+        let is_differential = setting(Register::Mode)? & u64::from(mode::DIFFERENTIAL) != 0;
+        let slots = setting(Register::Patterns)? * if is_differential { 2 } else { 1 };
+        Ok(slots * setting(Register::Dwell)? * setting(Register::Sweeps)?)
     }
 }
 
@@ -161,13 +181,14 @@ impl<F: SimulatedFpga> SimulatedFpga for PrecomputedFpga<F> {
 impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
         let value = self.model.read(address)?;
-        if address == Register::Version.address() {
-            return Ok(NO_PACKETS);
-        }
         let Some(run) = &self.run else { return Ok(value) };
         Ok(match Register::at(address) {
             Some(Register::FramesMade) => run.sequence,
             Some(Register::FramesLost) => 0,
+            Some(register) if run.offers() && MEASURES.contains(&register) => {
+                let measures = MEASURES.into_iter().zip(run.computed[run.slot()].measures);
+                measures.filter(|(of, _)| *of == register).map(|(_, value)| value).sum()
+            }
             Some(Register::Status) if run.offers() => {
                 value | status::RUNNING | status::LEDS_ON | status::FRAME_READY
             }
@@ -182,7 +203,7 @@ impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
         if let Some(run) = &mut self.run {
             if value & control::RELEASE != 0 && run.offers() {
                 run.sequence += 1;
-                run.stamped = false;
+                run.packet = None;
                 self.repeated_clocks += run.frame_clocks;
             }
             if value & control::STOP != 0 {
@@ -209,7 +230,7 @@ impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
 
     fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
         let run = self.run.as_mut().filter(|run| run.offers());
-        Ok(run.and_then(Run::stamp))
+        Ok(run.and_then(Run::packet))
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
@@ -229,7 +250,7 @@ mod tests {
         let model = VirtualOptics::new(sheet, 300.0).unwrap().ideal().fpga(1).unwrap();
         let mut fpga = PrecomputedFpga::new(model, 2);
         fpga.write(Register::Patterns.address(), 4).unwrap();
-        fpga.write(Register::Mode.address(), mode::DIFFERENTIAL).unwrap();
+        fpga.write(Register::Mode.address(), mode::DIFFERENTIAL | mode::PACKETS).unwrap();
         fpga.write(Register::Sweeps.address(), sweeps).unwrap();
         fpga
     }
@@ -250,8 +271,12 @@ mod tests {
     fn short_frames_are_repeated() {
         let mut fpga = fpga(1);
         fpga.write(Register::Control.address(), control::START).unwrap();
-        for _ in 0..5 {
-            assert!(fpga.frame().unwrap().is_some());
+        for number in 0..5 {
+            let packet = fpga.frame().unwrap().unwrap().to_vec();
+            let again = Computed::of(&packet, [0; 3]).expect("an intact packet");
+            assert_eq!(again.head.sequence, number);
+            // 40 clocks are 0.32 us.
+            assert_eq!(again.head.device_time_us, u64::from(number) * 40 / 125);
             fpga.write(Register::Control.address(), control::RELEASE).unwrap();
         }
         assert_eq!(fpga.read(Register::FramesMade.address()).unwrap(), 5);

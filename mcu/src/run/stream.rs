@@ -14,7 +14,6 @@ use super::{Counters, Path, Run};
 use crate::meter::Meter;
 use crate::ring::Found;
 use crate::{FpgaBus, Micros, PacketSink};
-use nirspi_wire::samples::Width;
 
 /// Most bytes of packets that go to the host in one transfer. With fewer the processor has more transfers to begin; with
 /// more the ring has less room, because a transfer's bytes are free when all of them have been sent.
@@ -54,7 +53,6 @@ impl Run {
         &mut self,
         now: Micros,
         path: Path<'_>,
-        width: Width,
         bus: &mut impl FpgaBus,
         sink: &mut impl PacketSink,
     ) -> bool {
@@ -64,7 +62,7 @@ impl Run {
         let mut stretch: Option<Stretch> = None;
         let mut packets = 0;
         while packets < MOST_PACKETS
-            && let Some(found) = bus.ring().and_then(|ring| ring.next(self.patterns, width))
+            && let Some(found) = bus.ring().and_then(|ring| ring.next(self.patterns, self.width))
         {
             if let Some(whole) = stretch.take_if(|before| !before.takes(&found)) {
                 whole.send(counters, bus, sink);

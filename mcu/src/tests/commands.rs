@@ -6,7 +6,7 @@ use nirspi_wire::register::{Design, IDENTITY, ORDER_TABLE, Register, mode};
 use nirspi_wire::samples::Words;
 use nirspi_wire::{
     Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, DeviceMessage,
-    EventKind, Identity, PatternOrder, RebootInto, Refusal, RunLength, SampleSource, State, Tail,
+    EventKind, Identity, PatternOrder, RebootInto, Refusal, RunLength, SampleSource, State,
     Version, version,
 };
 use std::vec::Vec;
@@ -21,14 +21,14 @@ fn hello_tells_who_the_device_is() {
     let expected = Identity {
         protocol: version::CURRENT,
         firmware: Version(1, 2, 3),
-        gateware: Version(0, 3, 0),
+        gateware: Version(0, 4, 0),
         board: "bench",
         serial: "0001",
         side: 32,
         adc_hz: 125_000_000,
         adc_bits: 14,
         wavelength_nm: 1550,
-        capabilities: Tail(Some(Capabilities::LOAD_GATEWARE.with(Capabilities::NARROW_SAMPLES))),
+        capabilities: Capabilities::LOAD_GATEWARE,
     };
     assert_eq!(identity, expected);
 }
@@ -41,9 +41,8 @@ fn a_camera_says_in_its_greeting_that_its_fpga_runs_the_bring_up_design() {
     else {
         panic!("no identity");
     };
-    let capabilities =
-        Capabilities::LOAD_GATEWARE.with(Capabilities::BRING_UP).with(Capabilities::NARROW_SAMPLES);
-    assert_eq!(identity.capabilities, Tail(Some(capabilities)));
+    let capabilities = Capabilities::LOAD_GATEWARE.with(Capabilities::BRING_UP);
+    assert_eq!(identity.capabilities, capabilities);
 }
 
 #[test]
@@ -116,21 +115,20 @@ fn a_configuration_is_in_the_registers_to_the_last_bit() {
         clocks_per_pattern: 9,
         blanked: 4,
         adc_latency: 63,
-        sweeps: 70_000,
+        sweeps: 26_000,
         source: SampleSource::TestPattern,
         over_range_trip: 17,
-        narrow: Tail(None),
     };
     assert_eq!(bench.ask(Command::Configure(configuration)), Ok(Answer::Done));
     assert_eq!(bench.camera.state(), State::Configured);
-    let modes = mode::DIFFERENTIAL | mode::ORDER_TABLE | mode::TEST_SOURCE;
+    let modes = mode::DIFFERENTIAL | mode::ORDER_TABLE | mode::TEST_SOURCE | mode::PACKETS;
     for (register, value) in [
         (Register::Mode, modes),
         (Register::Patterns, 1024),
         (Register::Dwell, 9),
         (Register::Blank, 4),
         (Register::Latency, 63),
-        (Register::Sweeps, 70_000),
+        (Register::Sweeps, 26_000),
         (Register::OverRangeTrip, 17),
         (Register::Watchdog, 25_000_000),
         (Register::DutyLimit, 1_310_720),
@@ -186,7 +184,8 @@ fn a_number_out_of_range_is_named_with_its_range() {
         (ClocksPerPattern, 0, 1, 65_535, Configuration { clocks_per_pattern: 0, ..SMALL }),
         (Blanked, 5, 0, 4, Configuration { blanked: 5, ..SMALL }),
         (AdcLatency, 64, 0, 63, Configuration { adc_latency: 64, ..SMALL }),
-        (Sweeps, 0, 1, u32::MAX, Configuration { sweeps: 0, ..SMALL }),
+        (Sweeps, 0, 1, 43_690, Configuration { sweeps: 0, ..SMALL }),
+        (Sweeps, 43_691, 1, 43_690, Configuration { sweeps: 43_691, ..SMALL }),
         (DutyPermille, 1000, 0, 625, Configuration { patterns: 1, ..wide }),
         (DutyPermille, 667, 0, 625, Configuration { patterns: 3, ..wide }),
     ] {

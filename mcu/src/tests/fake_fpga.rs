@@ -1,5 +1,4 @@
-//! A fake FPGA for tests: its registers, one frame or two, and every kind of failure. Its gateware makes no packets unless a
-//! test says so.
+//! A fake FPGA for tests: its registers, one frame or two, and every kind of failure.
 
 use crate::{BusError, FpgaBus};
 use nirspi_wire::fpga::{Header, Sums};
@@ -27,8 +26,6 @@ pub struct FakeFpga {
     pub lost: u32,
     pub clock: u64,
     pub frame: Option<Vec<u8>>,
-    /// A second frame can wait, as since gateware 0.3.3.
-    pub two_wait: bool,
     /// The frame that waits behind the delivered one, and what the signal meter will ask of it.
     pub behind: Option<(Vec<u8>, (u64, u32))>,
     /// Samples over range in every frame.
@@ -42,11 +39,6 @@ pub struct FakeFpga {
     /// After a read of this register, a frame is made, once.
     pub frame_after_read_of: Option<Register>,
     pub raw: Option<Vec<u8>>,
-    /// There is memory for a second frame.
-    pub keeps: bool,
-    pub kept: Option<Vec<u8>>,
-    /// The kept frame, once it has been given.
-    gone: Option<Vec<u8>>,
     /// A start completes all frames of the run before the next register read.
     pub instant: bool,
     /// Number of calls of `frame` and `raw` during which the transfer is still in progress.
@@ -75,16 +67,12 @@ pub struct FakeFpga {
     stamp: (u16, u64, u64),
 }
 
-/// Gateware that makes no packets.
-const OLDER: u32 = 0x0000_0300;
-
 impl Default for FakeFpga {
     fn default() -> Self {
         let mut registers: BTreeMap<_, _> =
             Register::ALL.iter().map(|r| (r.address(), r.reset())).collect();
         let ready = clocks::LOCKED | clocks::ALIVE | clocks::READY;
         registers.insert(Register::Clocks.address(), ready | (ADC_HZ / clocks::UNIT_HZ));
-        registers.insert(Register::Version.address(), OLDER);
         Self {
             registers,
             identity: IDENTITY,
@@ -95,7 +83,6 @@ impl Default for FakeFpga {
             lost: 0,
             clock: 0,
             frame: None,
-            two_wait: false,
             behind: None,
             over_range: 0,
             noise_of: |_, _| 0,
@@ -103,9 +90,6 @@ impl Default for FakeFpga {
             light: 0,
             frame_after_read_of: None,
             raw: None,
-            keeps: false,
-            kept: None,
-            gone: None,
             instant: false,
             transfer_polls: 0,
             dead: false,
@@ -131,11 +115,6 @@ impl FakeFpga {
         (self.config_error, self.after_loss)
     }
 
-    /// The same FPGA with the gateware of today, which makes packets.
-    pub fn make_packets(&mut self) {
-        self.registers.insert(Register::Version.address(), Register::Version.reset());
-    }
-
     /// Whether frames are delivered as packets.
     pub fn sends_packets(&self) -> bool {
         self.get(Register::Mode) & mode::PACKETS != 0
@@ -158,8 +137,7 @@ impl FakeFpga {
     /// Loses its configuration: all registers as after power-up.
     pub fn reset(&mut self) {
         let version = self.get(Register::Version);
-        let Self { accesses, keeps, two_wait, .. } = *self;
-        *self = Self { accesses, keeps, two_wait, ..Self::default() };
+        *self = Self { accesses: self.accesses, ..Self::default() };
         self.registers.insert(Register::Version.address(), version);
     }
 
@@ -205,7 +183,7 @@ impl FakeFpga {
         }
         let sequence = self.made;
         self.made = self.made.wrapping_add(1);
-        if self.frame.is_some() && (!self.two_wait || self.behind.is_some()) {
+        if self.behind.is_some() {
             self.lost += 1;
             self.after_loss = true;
         } else {
@@ -227,6 +205,11 @@ impl FakeFpga {
         if self.made == self.get(Register::Frames) {
             self.running = false;
         }
+    }
+
+    /// Delivers this frame, with what the signal meter will ask of it.
+    pub fn deliver(&mut self, frame: Vec<u8>, measures: (u64, u32)) {
+        (self.frame, self.measures) = (Some(frame), measures);
     }
 
     fn frame_bytes(&self, sequence: u32, mut flags: FrameFlags) -> Vec<u8> {
@@ -327,7 +310,6 @@ impl FakeFpga {
         let time = u64::from(self.get(Register::TimeHigh)) << 32;
         let time = time | u64::from(self.get(Register::TimeLow));
         self.stamp = (self.get(Register::Run) as u16, self.clock_read, time);
-        self.kept = None;
         self.after_loss = false;
         if raw {
             let samples = self.get(Register::RawLength) as u16;
@@ -418,19 +400,6 @@ impl FpgaBus for FakeFpga {
             return Ok(None);
         }
         if self.dead { Err(BusError::Timeout) } else { Ok(self.frame.as_deref()) }
-    }
-
-    fn keep(&mut self) -> bool {
-        if self.keeps {
-            self.kept.clone_from(&self.frame);
-        }
-        self.keeps
-    }
-
-    fn kept(&mut self) -> Option<&[u8]> {
-        // The copy lives until the next frame is kept.
-        self.gone = self.kept.take();
-        self.gone.as_deref()
     }
 
     fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {

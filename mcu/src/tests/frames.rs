@@ -2,6 +2,7 @@
 
 use super::support::*;
 use crate::{Micros, RAW_PIECE_SAMPLES};
+use nirspi_wire::ready::MAX_SUMMED_SAMPLES;
 use nirspi_wire::register::Register;
 use nirspi_wire::{
     Answer, Command, Configuration, DeviceMessage, EventKind, Fault, FrameFlags, Refusal,
@@ -43,13 +44,14 @@ fn a_frame_carries_the_differences_of_its_sums() {
 #[test]
 fn the_longest_frame_fits_its_packet() {
     let mut bench = Bench::open();
-    let whole = Configuration { patterns: 1024, sweeps: u32::MAX, ..SMALL };
+    let sweeps = MAX_SUMMED_SAMPLES / 3;
+    let whole = Configuration { patterns: 1024, sweeps, ..SMALL };
     assert_eq!(bench.ask(Command::Configure(whole)), Ok(Answer::Done));
     bench.now = Micros(u64::MAX / 2);
     bench.after(0);
     bench.fpga.clock = 1 << 62;
     assert_eq!(bench.ask(Command::Start(RunLength::Continuous)), Ok(Answer::Done));
-    bench.fpga.made = u32::MAX - 1;
+    bench.fpga.made = i32::MAX as u32 - 1;
     bench.frame();
     let heard = bench.heard();
     assert_eq!(frames(&heard)[0].samples.len(), 1024);
@@ -87,21 +89,23 @@ fn a_run_whose_last_frame_is_lost_in_the_fpga_ends_all_the_same() {
         bench.fpga.make_frame();
     }
     bench.after(1_000);
+    bench.after(1_000);
     let heard = bench.heard();
-    assert_eq!(frames(&heard).len(), 1);
-    assert_eq!(events(&heard), [ended(1, 3, 0, 2, 0)]);
+    assert_eq!(frames(&heard).len(), 2);
+    assert_eq!(events(&heard), [ended(1, 3, 0, 1, 0)]);
 }
 
 #[test]
 fn a_loss_in_the_fpga_is_counted_and_flagged() {
     let mut bench = Bench::running(RunLength::Continuous);
     bench.fpga.make_frame();
+    bench.fpga.make_frame();
     bench.frame();
+    bench.after(100);
     bench.frame();
     let heard = bench.heard();
-    let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
-    assert_eq!(sequences, [0, 2]);
-    assert!(frames(&heard)[1].flags.contains(FrameFlags::AFTER_LOSS));
+    assert_eq!(sequences(&heard), [0, 1, 3]);
+    assert!(frames(&heard)[2].flags.contains(FrameFlags::AFTER_LOSS));
     assert_eq!(bench.status().fpga_frames_lost, 1);
 }
 
@@ -134,44 +138,9 @@ fn a_frame_does_not_overtake_a_reply_that_waits() {
 }
 
 #[test]
-fn a_damaged_frame_is_counted_released_and_not_sent() {
-    let mut bench = Bench::running(RunLength::Continuous);
-    bench.fpga.make_frame();
-    bench.fpga.frame.as_mut().unwrap()[40] ^= 1;
-    bench.after(10);
-    assert!(bench.fpga.frame.is_none());
-    assert_eq!(frames(&bench.heard()).len(), 0);
-    assert_eq!(bench.status().fpga_frames_corrupt, 1);
-}
-
-/// The firmware could not read the frame's number at first, and the bus has lost the frame's release, so the FPGA
-/// delivers the frame again.
-#[test]
-fn a_frame_that_was_damaged_on_the_way_and_comes_again_whole_counts_once() {
-    let mut bench = Bench::running(RunLength::Continuous);
-    bench.fpga.make_frame();
-    let damage = |bench: &mut Bench| bench.fpga.frame.as_mut().unwrap()[0] ^= 1;
-    damage(&mut bench);
-    bench.fpga.lost_address = Some(Register::Control.address());
-    bench.after(10);
-    assert_eq!(bench.status().fpga_frames_corrupt, 1);
-    bench.after(10);
-    assert_eq!(bench.status().fpga_frames_corrupt, 1, "the same frame");
-    damage(&mut bench);
-    bench.fpga.lost_address = None;
-    bench.after(10);
-    assert_eq!(sequences(&bench.heard()), [0]);
-    let status = bench.status();
-    assert_eq!((status.frames_sent, status.fpga_frames_corrupt), (1, 0));
-    bench.frame();
-    let status = bench.status();
-    assert_eq!((status.frames_made, status.frames_sent, status.fpga_frames_corrupt), (2, 2, 0));
-}
-
-#[test]
 fn an_intact_frame_of_another_length_is_damaged_too() {
     let mut bench = Bench::running(RunLength::Continuous);
-    bench.fpga.registers.insert(Register::Patterns.address(), 2000);
+    bench.fpga.registers.insert(Register::Patterns.address(), 900);
     bench.frame();
     assert_eq!(bench.status().fpga_frames_corrupt, 1);
 }

@@ -31,8 +31,8 @@ pub(super) struct Port {
     pub always_wrong: u64,
     /// Each access has other wrong bits than the one before.
     pub is_noisy: bool,
-    /// The gateware checks nothing, and sends zeros in place of a check.
-    pub is_old: bool,
+    /// Lines that stand still: every byte of an answer, and no write arrives.
+    pub stands_at: Option<u8>,
 }
 
 impl Port {
@@ -52,24 +52,18 @@ impl Port {
 impl HostPort for Port {
     fn write(&mut self, address: u16, sealed: [u8; SEALED_BYTES]) -> Result<(), BusError> {
         let (address, sealed) = self.carry(address, sealed);
-        let [v0, v1, v2, v3, ..] = sealed;
-        let value = match unseal(address, sealed) {
-            _ if self.is_old => u32::from_be_bytes([v0, v1, v2, v3]),
-            Some(value) => value,
-            None => return Ok(()),
-        };
-        self.fpga.write(address, value)
+        match unseal(address, sealed) {
+            Some(value) if self.stands_at.is_none() => self.fpga.write(address, value),
+            _ => Ok(()),
+        }
     }
 
     fn read(&mut self, address: u16) -> Result<[u8; SEALED_BYTES], BusError> {
         // The same wires for both ways: first the address, then the answer.
         let (seen, wrong) = self.carry(address, [0; SEALED_BYTES]);
         let mut sealed = seal(seen, self.fpga.read(seen)?);
-        if self.is_old {
-            sealed[4..].fill(0);
-        }
         sealed.iter_mut().zip(wrong).for_each(|(byte, wrong)| *byte ^= wrong);
-        Ok(sealed)
+        Ok(self.stands_at.map_or(sealed, |level| [level; SEALED_BYTES]))
     }
 
     fn frame_ready(&mut self) -> bool {
@@ -107,14 +101,10 @@ pub(super) fn bus() -> PortBus<'static, Port> {
     PortBus::new(Port::default(), Box::leak(Box::new([0; MAX_FRAME_BYTES])))
 }
 
-fn bus_of_two() -> PortBus<'static, Port> {
-    bus().with_spare(Some(Box::leak(Box::new([0; MAX_FRAME_BYTES]))))
-}
-
 /// Does a board's work between two polls, without the packing; true if there was any.
 fn serve(bus: &mut PortBus<'_, Port>) -> bool {
     let Some(Wanted { port, opcode, into }) = bus.wanted() else { return false };
-    let Target::Bus { bytes, .. } = into else { panic!("{into:?}") };
+    let Target::Bus(bytes) = into else { panic!("{into:?}") };
     let done = port.transfer(opcode, bytes);
     bus.transferred(done);
     true
@@ -123,7 +113,7 @@ fn serve(bus: &mut PortBus<'_, Port>) -> bool {
 /// Bytes of the transfer that is wanted.
 fn wanted(bus: &mut PortBus<'_, Port>) -> usize {
     match bus.wanted().unwrap().into {
-        Target::Bus { bytes, .. } => bytes.len(),
+        Target::Bus(bytes) => bytes.len(),
         Target::Link(length) => length,
     }
 }
@@ -190,52 +180,6 @@ fn a_transfer_that_is_wanted_no_more_is_forgotten() {
     // A late report of the end of a transfer is ignored.
     bus.transferred(Ok(()));
     assert_eq!(bus.frame(), Ok(None));
-}
-
-#[test]
-fn a_kept_frame_outlives_its_release_and_is_given_once() {
-    let mut bus = bus_of_two();
-    start(&mut bus, 2);
-    assert!(!bus.keep(), "there is no frame");
-    assert_eq!(fetch(&mut bus), 0);
-    assert!(bus.keep());
-    control(&mut bus, control::RELEASE);
-
-    // During the transfer of the next frame, which comes into the other buffer.
-    bus.port().fpga.make_frame();
-    assert_eq!(bus.frame(), Ok(None));
-    let Wanted { port, opcode, into } = bus.wanted().unwrap();
-    let Target::Bus { bytes, kept } = into else { panic!("{into:?}") };
-    let done = port.transfer(opcode, bytes);
-    assert_eq!((sequence(kept.unwrap()), kept.unwrap().len()), (0, frame_bytes(2)));
-    bus.transferred(done);
-    assert_eq!(sequence(bus.frame().unwrap().unwrap()), 1);
-    assert_eq!(bus.kept(), None, "given once");
-
-    assert!(bus.keep());
-    control(&mut bus, control::RELEASE);
-    assert_eq!(bus.kept().map(sequence), Some(1), "without a transfer too");
-    assert_eq!(bus.kept(), None);
-}
-
-#[test]
-fn a_frame_kept_before_a_start_is_not_given_after_it() {
-    let mut bus = bus_of_two();
-    start(&mut bus, 2);
-    fetch(&mut bus);
-    assert!(bus.keep());
-    start(&mut bus, 3);
-    assert_eq!(bus.kept(), None);
-    assert!(!bus.keep());
-}
-
-#[test]
-fn a_bus_without_a_second_buffer_keeps_nothing() {
-    let mut bus = bus();
-    start(&mut bus, 2);
-    fetch(&mut bus);
-    assert!(!bus.keep());
-    assert_eq!(bus.frame().unwrap().map(sequence), Some(0), "still there");
 }
 
 /// The FPGA copies its settings when it starts.
@@ -341,13 +285,16 @@ pub(super) struct Device {
     pub bus: PortBus<'static, Port>,
     pub link: Link,
     pub now: Micros,
+    /// Time that the transfer of a packet takes.
+    pub transfer_us: u64,
 }
 
 impl Device {
     pub(super) fn new(bus: PortBus<'static, Port>) -> Self {
         let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
         let camera = Camera::new(info, Limits::default());
-        let mut device = Self { camera, bus, link: Link::default(), now: Micros(1_000) };
+        let mut device =
+            Self { camera, bus, link: Link::default(), now: Micros(1_000), transfer_us: 0 };
         device.ask(Command::Hello { protocol: version::CURRENT });
         device
     }
@@ -360,11 +307,8 @@ impl Device {
         self.camera.poll(self.now, &GOOD_INPUTS, ports);
         match self.bus.wanted() {
             None => {}
-            Some(Wanted { port, opcode, into: Target::Bus { bytes, kept } }) => {
+            Some(Wanted { port, opcode, into: Target::Bus(bytes) }) => {
                 let done = port.transfer(opcode, bytes);
-                if let Some(frame) = kept {
-                    self.camera.pack(self.now, frame, &mut self.link);
-                }
                 self.bus.transferred(done);
             }
             Some(Wanted { port, opcode, into: Target::Link(length) }) => {
@@ -372,6 +316,7 @@ impl Device {
                     let done = port.transfer(opcode, room);
                     self.bus.transferred(done);
                 }
+                self.now.0 += self.transfer_us;
                 let ports =
                     &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
                 self.camera.forward(self.now, ports);
@@ -393,157 +338,84 @@ impl Device {
 
 #[test]
 fn the_camera_streams_over_the_port_and_counts_what_could_not_be_read() {
-    for bus in [bus(), bus_of_two()] {
-        let mut device = Device::new(bus);
-        device.ask(Command::Configure(SMALL));
-        device.ask(Command::Start(RunLength::Frames(5)));
-        let mut heard = Vec::new();
-        for number in 0..5 {
-            device.bus.port().failures = if number == 2 { 3 } else { 0 };
-            device.bus.port().fpga.make_frame();
-            for _ in 0..6 {
-                device.turn(&[]);
-            }
-            heard.extend(device.heard());
-        }
-        // The last frame waits a millisecond for the next, which does not come.
-        for _ in 0..10 {
+    let mut device = Device::new(bus());
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Frames(5)));
+    let mut heard = Vec::new();
+    for number in 0..5 {
+        device.bus.port().failures = if number == 2 { 3 } else { 0 };
+        device.bus.port().fpga.make_frame();
+        for _ in 0..6 {
             device.turn(&[]);
         }
         heard.extend(device.heard());
-        let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
-        assert_eq!(sequences, [0, 1, 3, 4]);
-        let ended = EventKind::RunEnded {
-            run: 1,
-            frames_made: 5,
-            frames_dropped: 0,
-            fpga_frames_lost: 0,
-            fpga_frames_corrupt: 1,
-        };
-        assert_eq!(events(&heard), [ended]);
     }
+    let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
+    assert_eq!(sequences, [0, 1, 3, 4]);
+    let ended = EventKind::RunEnded {
+        run: 1,
+        frames_made: 5,
+        frames_dropped: 0,
+        fpga_frames_lost: 0,
+        fpga_frames_corrupt: 1,
+    };
+    assert_eq!(events(&heard), [ended]);
 }
 
 /// Until the FPGA takes the release, its line still signals the frame that was read before.
 #[test]
 fn a_frame_is_read_once_however_long_its_release_does_not_come_through() {
-    for (mut bus, packets) in [(bus(), false), (bus_of_two(), false), (bus(), true)] {
-        if packets {
-            bus.port().fpga.make_packets();
-        }
-        let mut device = Device::new(bus);
-        device.ask(Command::Configure(SMALL));
-        device.ask(Command::Start(RunLength::Continuous));
-        device.bus.port().fpga.lost_address = Some(Register::Control.address());
-        device.bus.port().fpga.make_frame();
-        for _ in 0..20 {
-            device.turn(&[]);
-        }
-        assert!(device.bus.port().fpga.frame.is_some(), "the release is lost");
-        assert_eq!(device.bus.port().transfers.len(), 1);
-
-        device.bus.port().fpga.lost_address = None;
-        device.turn(&[]);
-        device.bus.port().fpga.make_frame();
-        for _ in 0..20 {
-            device.turn(&[]);
-        }
-        assert_eq!(device.bus.port().transfers.len(), 2);
-        let heard = device.heard();
-        let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
-        assert_eq!(sequences, [0, 1]);
-    }
-}
-
-#[test]
-fn with_a_second_buffer_the_fpga_has_its_own_back_before_the_frame_is_packed() {
-    let mut device = Device::new(bus_of_two());
+    let mut device = Device::new(bus());
     device.ask(Command::Configure(SMALL));
     device.ask(Command::Start(RunLength::Continuous));
+    device.bus.port().fpga.lost_address = Some(Register::Control.address());
     device.bus.port().fpga.make_frame();
-    device.turn(&[]);
-    device.turn(&[]);
-    assert!(device.bus.port().fpga.frame.is_none(), "released");
-    assert!(frames(&device.heard()).is_empty(), "the frame waits for the next transfer");
-    device.bus.port().fpga.make_frame();
-    device.turn(&[]);
-    assert_eq!(frames(&device.heard()).len(), 1, "packed during the transfer");
-}
-
-/// A device in a run, whose bus has just kept a frame.
-fn keeping(lost_address: Option<u16>) -> Device {
-    let mut device = Device::new(bus_of_two());
-    device.ask(Command::Configure(SMALL));
-    device.ask(Command::Start(RunLength::Continuous));
-    device.bus.port().fpga.make_frame();
-    device.turn(&[]);
-    device.bus.port().fpga.lost_address = lost_address;
-    device.turn(&[]);
-    assert!(frames(&device.heard()).is_empty(), "kept");
-    device
-}
-
-#[test]
-fn a_kept_frame_waits_a_millisecond_for_the_next_one_at_most() {
-    let mut device = keeping(None);
-    let kept = device.now;
-    // A turn takes 100 us.
-    for (age, sent) in [(999, 0), (1_000, 1), (2_000, 0)] {
-        device.now.0 = kept.0 + age - 100;
+    for _ in 0..20 {
         device.turn(&[]);
-        assert_eq!(frames(&device.heard()).len(), sent, "after {age} us");
     }
-}
+    assert!(device.bus.port().fpga.frame.is_some(), "the release is lost");
+    assert_eq!(device.bus.port().transfers.len(), 1);
 
-#[test]
-fn a_kept_frame_does_not_wait_when_no_next_one_can_come() {
-    // The run has ended.
-    let mut device = keeping(None);
-    device.turn(&packet(1, Command::Stop));
-    assert_eq!(frames(&device.heard()).len(), 1);
-    // The FPGA has not taken the release.
-    let mut device = keeping(Some(Register::Control.address()));
+    device.bus.port().fpga.lost_address = None;
     device.turn(&[]);
-    assert_eq!(frames(&device.heard()).len(), 1);
+    device.bus.port().fpga.make_frame();
+    for _ in 0..20 {
+        device.turn(&[]);
+    }
+    assert_eq!(device.bus.port().transfers.len(), 2);
+    let heard = device.heard();
+    let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
+    assert_eq!(sequences, [0, 1]);
 }
 
 #[test]
 fn a_run_of_frames_that_come_slowly_goes_on() {
-    for bus in [bus(), bus_of_two()] {
-        let mut device = Device::new(bus);
-        device.ask(Command::Configure(SMALL));
-        device.ask(Command::Start(RunLength::Continuous));
-        for _ in 0..5 {
-            device.bus.port().fpga.make_frame();
-            device.turn(&[]);
-            // The transfer takes longer than the patience with an FPGA that makes no frame.
-            device.now.0 += Limits::default().stall_min.0 + 50_000;
-            device.turn(&[]);
-        }
-        device.now.0 += 2_000;
+    let mut device = Device::new(bus());
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Continuous));
+    // The transfer takes longer than the patience with an FPGA that makes no frame.
+    device.transfer_us = Limits::default().stall_min.0 + 50_000;
+    for _ in 0..5 {
+        device.bus.port().fpga.make_frame();
         device.turn(&[]);
-        let heard = device.heard();
-        assert_eq!((frames(&heard).len(), events(&heard).len()), (5, 0));
     }
+    let heard = device.heard();
+    assert_eq!((frames(&heard).len(), events(&heard).len()), (5, 0));
 }
 
 /// A transfer over an emulated board's serial line takes longer than the end of a run waits.
 #[test]
 fn a_frame_that_comes_slowly_at_the_end_of_a_run_is_sent() {
-    for bus in [bus(), bus_of_two()] {
-        let mut device = Device::new(bus);
-        device.ask(Command::Configure(SMALL));
-        device.ask(Command::Start(RunLength::Frames(1)));
-        device.bus.port().fpga.make_frame();
-        device.now.0 += 2_000;
-        device.turn(&[]);
-        device.now.0 += 200_000;
-        device.turn(&[]);
-        device.turn(&[]);
-        let heard = device.heard();
-        assert_eq!(frames(&heard).len(), 1);
-        assert!(matches!(events(&heard)[..], [EventKind::RunEnded { fpga_frames_corrupt: 0, .. }]));
-    }
+    let mut device = Device::new(bus());
+    device.ask(Command::Configure(SMALL));
+    device.ask(Command::Start(RunLength::Frames(1)));
+    device.bus.port().fpga.make_frame();
+    device.transfer_us = 200_000;
+    device.turn(&[]);
+    device.turn(&[]);
+    let heard = device.heard();
+    assert_eq!(frames(&heard).len(), 1);
+    assert!(matches!(events(&heard)[..], [EventKind::RunEnded { fpga_frames_corrupt: 0, .. }]));
 }
 
 #[test]

@@ -2,11 +2,15 @@
 
 use super::{Exposure, Meter};
 use crate::configure::{self, Setup};
-use crate::run::{SAMPLE_BYTES, assemble};
+use crate::run::SAMPLE_BYTES;
+use crate::tests::fake_fpga::FakeFpga;
 use crate::tests::support::SMALL;
 use crate::{Limits, Micros};
-use nirspi_wire::fpga::{Header, Sums};
-use nirspi_wire::{Configuration, FrameFlags, PATTERNS, Signal, crc32};
+use nirspi_wire::fpga::Sums;
+use nirspi_wire::packet::{MAX_DEVICE_PACKET, seal};
+use nirspi_wire::ready::{Head, MAX_SUMMED_SAMPLES};
+use nirspi_wire::samples::Width;
+use nirspi_wire::{Configuration, FrameFlags, PATTERNS, Signal};
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -17,19 +21,19 @@ fn setup(configuration: Configuration<'static>) -> Setup {
     configure::check(&configuration, &Limits::default()).unwrap()
 }
 
-fn header(sequence: u32) -> Header {
-    Header {
-        patterns: PATTERNS,
-        flags: FrameFlags::default(),
-        sequence,
-        sweeps: 1,
-        over_range: 0,
-        lost: 0,
-        clock: 0,
-    }
+/// What the packet of a frame says, and its samples over range.
+#[derive(Clone, Copy)]
+struct Header {
+    sequence: u32,
+    flags: FrameFlags,
+    over_range: u32,
 }
 
-/// A meter, and the memory that it shares with the frames on their way to the host.
+fn header(sequence: u32) -> Header {
+    Header { sequence, flags: FrameFlags::default(), over_range: 0 }
+}
+
+/// A meter, and the memory in which it keeps a frame.
 struct Bench {
     meter: Meter,
     scratch: Vec<u8>,
@@ -44,11 +48,26 @@ impl Bench {
 
     /// A frame comes from the FPGA.
     fn see(&mut self, now: u64, header: &Header, sums: impl IntoIterator<Item = Sums>) {
-        let mut bytes = header.to_bytes().to_vec();
-        sums.into_iter().for_each(|sums| bytes.extend(sums.to_bytes()));
-        bytes.extend(crc32(&bytes).to_le_bytes());
-        let meter = (&mut self.meter, Micros(now));
-        assemble(&bytes, header.patterns, meter, &mut self.scratch).unwrap();
+        let &Header { sequence, flags, over_range } = header;
+        let head = Head {
+            run: 1,
+            sequence,
+            device_time_us: now,
+            sweeps: 1,
+            flags,
+            patterns: PATTERNS,
+            width: Width::Bits32,
+        };
+        let (mut payload, mut level) = (head.to_bytes().to_vec(), 0);
+        for sums in sums {
+            level += sums.positive + sums.negative;
+            payload.extend(i32::try_from(sums.difference()).unwrap().to_le_bytes());
+        }
+        let mut room = [0; MAX_DEVICE_PACKET];
+        let packet = &*seal(&payload, &mut room).unwrap();
+        let mut bus = FakeFpga::default();
+        bus.deliver(packet.to_vec(), (level, over_range));
+        self.meter.look(Micros(now), (packet, PATTERNS), &mut self.scratch, &mut bus);
     }
 }
 
@@ -117,7 +136,7 @@ proptest! {
     #[test]
     fn light_and_noise_are_told_in_counts_of_a_sample(
         level in 4_000.0_f64..10_000.0, signal in 50.0_f64..400.0, noise in 2.0_f64..20.0,
-        differential: bool, sweeps in 1_u32..100_000,
+        differential: bool, sweeps in 1..=MAX_SUMMED_SAMPLES / 3,
     ) {
         let light = Light { level, signal, noise, differential, samples: 3.0 * f64::from(sweeps) };
         let seen = light.seen(Configuration { sweeps, differential, ..FULL });
@@ -194,8 +213,8 @@ fn a_depth_map_in_the_memory_of_the_first_frame_is_not_compared() {
 
 #[test]
 fn the_brightest_and_longest_frame_fits() {
-    let longest =
-        Configuration { clocks_per_pattern: 4_000, blanked: 0, sweeps: 4_000_000, ..FULL };
+    let sweeps = MAX_SUMMED_SAMPLES / 4_000;
+    let longest = Configuration { clocks_per_pattern: 4_000, blanked: 0, sweeps, ..FULL };
     let samples = Exposure::of(&setup(longest)).samples;
     let bright = Sums { positive: samples * 16_383, negative: 0 };
     let dark = Sums { positive: 0, negative: samples * 16_383 };

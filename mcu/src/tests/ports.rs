@@ -3,7 +3,6 @@
 use super::support::*;
 use crate::{BusError, FpgaBus, GatewareLoader, LoadError, Micros, NoLoader};
 use nirspi_wire::RunLength;
-use nirspi_wire::samples::Width;
 
 /// A bus with a frame and nothing that is optional.
 struct Bus([u8; 4]);
@@ -35,13 +34,11 @@ impl FpgaBus for Bus {
 }
 
 #[test]
-fn a_bus_that_says_nothing_of_it_has_no_second_buffer_and_no_ring() {
+fn a_bus_that_says_nothing_of_it_has_no_memory_and_no_ring() {
     let mut bus = Bus([1, 2, 3, 4]);
     assert_eq!(bus.damaged(), 0);
-    assert!(!bus.keep() && bus.kept().is_none());
-    assert!(bus.ring().is_none() && !bus.streams());
+    assert!(bus.ring().is_none());
     assert!(bus.memory().is_none());
-    assert!(bus.packet_bytes(4, Width::Bits24) > 4 * 3);
 }
 
 #[test]

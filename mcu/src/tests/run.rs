@@ -22,7 +22,7 @@ fn a_run_of_one_frame_sends_the_frame_and_ends_when_it_is_through() {
     let path =
         Path { counters: &mut counters, meter: &mut meter, scratch: &mut scratch, may_send: true };
     let coming = (true, &mut release_pending);
-    assert!(run.take_frame(Micros(2), path, coming, &mut bus, &mut link));
+    assert!(run.take(Micros(2), path, coming, &mut bus, &mut link));
     assert_eq!((link.packets.len(), counters.sent, release_pending), (1, 1, false));
     assert_eq!(run.progress(Micros(3), &counters), Progress::Complete);
 

@@ -3,7 +3,7 @@
 use super::support::*;
 use crate::Limits;
 use nirspi_wire::packet::encode;
-use nirspi_wire::{Command, EventKind, Fault, RunLength};
+use nirspi_wire::{EventKind, Fault, RunLength};
 use std::vec::Vec;
 
 /// Twice the time after which a silent host ends a run, with a frame each 10 ms and these bytes each second.
@@ -41,12 +41,4 @@ fn bytes_that_are_no_command_of_the_session_are_not_taken_for_a_host() {
     two_silences_with(&mut bench, &damaged);
     assert!(!bench.fpga.leds_on());
     assert!(bench.heard_events().contains(&EventKind::Fault(Fault::HostSilent)));
-
-    // A host of version 1 sends no command that a camera of version 1 does not know.
-    let mut bench = Bench::new();
-    bench.ask(Command::Hello { protocol: 1 }).unwrap();
-    bench.ask(Command::Configure(SMALL)).unwrap();
-    bench.ask(Command::Start(RunLength::Continuous)).unwrap();
-    two_silences_with(&mut bench, &unknown_command());
-    assert!(!bench.fpga.leds_on());
 }

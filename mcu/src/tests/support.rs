@@ -11,7 +11,7 @@ use core::sync::atomic::Ordering;
 use nirspi_wire::packet::{MAX_HOST_PACKET, encode, open};
 use nirspi_wire::{
     Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
-    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Tail, Version, version,
+    PatternOrder, Refusal, Reply, Request, RunLength, SampleSource, Status, Version, version,
 };
 use std::boxed::Box;
 use std::collections::VecDeque;
@@ -148,7 +148,6 @@ pub const SMALL: Configuration<'static> = Configuration {
     sweeps: 1,
     source: SampleSource::Detector,
     over_range_trip: 100,
-    narrow: Tail(None),
 };
 
 impl Bench {
@@ -186,17 +185,7 @@ impl Bench {
 
     /// A bench with the LEDs on.
     pub fn running(length: RunLength) -> Self {
-        Self::running_with(length, false)
-    }
-
-    /// A bench with the LEDs on, whose gateware makes packets or is older.
-    pub fn running_with(length: RunLength, packets: bool) -> Self {
-        let mut bench = Self::open();
-        if packets {
-            bench.fpga.make_packets();
-        }
-        assert_eq!(bench.ask(Command::Configure(SMALL)), Ok(Answer::Done));
-        assert_eq!(bench.fpga.sends_packets(), packets);
+        let mut bench = Self::configured();
         assert_eq!(bench.ask(Command::Start(length)), Ok(Answer::Done));
         assert!(bench.fpga.leds_on());
         bench

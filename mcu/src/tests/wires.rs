@@ -4,10 +4,7 @@ use super::host_port::{Device, bus};
 use super::support::*;
 use crate::{BusError, FpgaBus};
 use nirspi_wire::register::{DAMAGED, IDENTITY, ORDER_TABLE, Register, control};
-use nirspi_wire::{
-    Answer, Command, DeviceMessage, EventKind, Fault, Refusal, Reply, RunLength, State, Version,
-    version,
-};
+use nirspi_wire::{Command, DeviceMessage, EventKind, Fault, Refusal, Reply, RunLength, State};
 use proptest::prelude::*;
 use std::vec;
 use std::vec::Vec;
@@ -149,30 +146,6 @@ fn damage_ends_no_run_and_the_host_is_told_at_most_once_a_second() {
     assert!(counts.is_sorted_by(|a, b| a < b));
 }
 
-/// Gateware 0.2 sends no check and knows of none.
-#[test]
-fn gateware_that_checks_nothing_is_named_and_refused() {
-    let mut old = bus();
-    old.port().is_old = true;
-    old.port().fpga.registers.insert(Register::Version.address(), 0x0000_0200);
-    let mut device = Device::new(old);
-    let heard = device.ask(Command::Hello { protocol: version::CURRENT });
-    let [DeviceMessage::Reply(Reply { outcome: Ok(Answer::Hello(identity)), .. })] = heard[..]
-    else {
-        panic!("{heard:?}");
-    };
-    assert_eq!(identity.gateware, Version(0, 2, 0));
-    let foreign = Fault::FpgaAbsent { identity: IDENTITY };
-    for _ in 0..3 {
-        let heard = device.ask(Command::Configure(SMALL));
-        let refused = heard.iter().any(|message| {
-            let refusal = Err(Refusal::Fault(foreign));
-            matches!(message, DeviceMessage::Reply(Reply { outcome, .. }) if *outcome == refusal)
-        });
-        assert!(refused, "{heard:?}");
-    }
-}
-
 /// Wires that are crossed or stand still: the same wrong answer every time.
 #[test]
 fn a_steady_wrong_identity_is_told_as_it_reads_and_no_other_register_is() {
@@ -195,12 +168,9 @@ fn a_steady_wrong_identity_is_told_as_it_reads_and_no_other_register_is() {
 
 #[test]
 fn lines_that_stand_still_are_an_absent_fpga() {
-    for level in [0, u32::MAX] {
+    for (byte, level) in [(0, 0), (0xFF, u32::MAX)] {
         let mut bus = bus();
-        // An old FPGA that reads as one level is what unconnected lines read as.
-        bus.port().is_old = true;
-        bus.port().fpga.identity = level;
-        bus.port().always_wrong = u64::from(level & 0xFFFF);
+        bus.port().stands_at = Some(byte);
         let mut device = Device::new(bus);
         let refused = Err(Refusal::Fault(Fault::FpgaAbsent { identity: level }));
         let heard = device.ask(Command::Configure(SMALL));

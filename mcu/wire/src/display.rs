@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn a_version_has_three_numbers_and_every_damage_its_own_words() {
-        assert_eq!(Version(0, 3, 7).to_string(), "0.3.7");
+        assert_eq!(Version(0, 4, 7).to_string(), "0.4.7");
         let all = [
             PacketError::BufferTooSmall,
             PacketError::TooLong,

@@ -21,14 +21,13 @@
 //! [`READ_PACKET`] is a [`READ_FRAME`] by four lines whose bits are clocked by `sck` itself, from
 //! [`PACKET_SCK_MIN_HZ`] to [`PACKET_SCK_MAX_HZ`]. The phases and their clocks are the same. Only packets
 //! ([`mode::PACKETS`](crate::register::mode::PACKETS)) come without a gap at that speed. Without the
-//! ADC's clock, the FPGA does not drive the lines. Since gateware 0.3.4; older gateware ignores the
-//! opcode.
+//! ADC's clock, the FPGA does not drive the lines.
 //!
 //! # Check
 //! The check is a CRC-16 of address and value ([`check`]): 64 bits with itself. Up to three wrong bits,
 //! and wrong bits within four clocks of four lines, never pass; anything else passes once in 65 536
 //! times. The answer to a read has the check of the address that the FPGA has seen, so an address
-//! that came damaged shows too. Gateware before version 0.3 sends zeros in place of the check.
+//! that came damaged shows too.
 //!
 //! # Invariant
 //! A register access with up to three wrong bits is never taken
@@ -101,20 +100,11 @@ pub const fn unseal(address: u16, sealed: [u8; SEALED_BYTES]) -> Option<u32> {
     if check(address, value) == u16::from_be_bytes([c0, c1]) { Some(value) } else { None }
 }
 
-/// The value of gateware that sends zeros in place of a check.
-#[must_use]
-pub const fn unchecked(sealed: [u8; SEALED_BYTES]) -> Option<u32> {
-    match sealed {
-        [v0, v1, v2, v3, 0, 0] => Some(u32::from_be_bytes([v0, v1, v2, v3])),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::PATTERNS;
-    use crate::register::{IDENTITY, ORDER_TABLE, Register};
+    use crate::register::{ORDER_TABLE, Register};
     use proptest::prelude::*;
 
     /// The catalogue of parametrised CRCs states the CRC-16/IBM-3740 of the nine digits from 1 to 9. The first six digits
@@ -169,15 +159,6 @@ mod tests {
                 assert_eq!(unseal(address, [level; SEALED_BYTES]), None, "{address:#x} {level:#x}");
             }
         }
-        assert_eq!(unchecked(seal(Register::Identity.address(), IDENTITY)), None);
-    }
-
-    #[test]
-    fn a_value_without_a_check_has_zeros_in_its_place_and_nothing_else() {
-        let [v0, v1, v2, v3] = 0x0002_0001u32.to_be_bytes();
-        assert_eq!(unchecked([v0, v1, v2, v3, 0, 0]), Some(0x0002_0001));
-        assert_eq!(unchecked([v0, v1, v2, v3, 0, 1]), None);
-        assert_eq!(unchecked([v0, v1, v2, v3, 1, 0]), None);
     }
 
     /// One edge of `sck` too many repeats a bit, and one too few leaves a bit out.

@@ -42,7 +42,6 @@ pub mod walsh;
 mod crc32;
 mod display;
 mod stuffing;
-mod tail;
 
 pub use crc32::{Crc32, crc32};
 pub use message::{
@@ -53,7 +52,6 @@ pub use message::{
 };
 pub use packet::{Deframed, Deframer, PacketError, encode, open};
 pub use samples::Samples;
-pub use tail::Tail;
 
 /// LEDs along one edge of the array (paper, section 2.A).
 pub const SIDE: u8 = 32;

@@ -1,11 +1,11 @@
 //! Commands of the host, replies and stream of the device.
 //!
 //! # Invariant
-//! These types are the format of every version from [`version::MIN`](crate::version::MIN) on: variants and tails are
-//! appended, everything else stays ([`version`](crate::version) has the rules; `tests/frozen` holds the bytes).
+//! These types are the format of every version from [`version::MIN`](crate::version::MIN) on: from the first release on,
+//! variants and fields are appended, everything else stays ([`version`](crate::version) has the rules; `tests/frozen`
+//! holds the bytes).
 
-use crate::Tail;
-use crate::samples::{Block, Samples, Width, Words};
+use crate::samples::{Block, Samples, Words};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A host that sends no valid command for this long while LEDs are on is taken for dead, and they go off.
@@ -132,10 +132,6 @@ pub struct Configuration<'a> {
     pub source: SampleSource,
     /// Over-range samples in one frame that switch the LEDs off; 0 only flags them.
     pub over_range_trip: u32,
-    /// Whether the host asks for samples of 24 bits. A camera that has them ([`Capabilities::NARROW_SAMPLES`]) sends them if
-    /// its gateware makes the packets and no sample of the run can leave 24 bits, and 32 bits otherwise. Absent: 32 bits.
-    /// Since version 4.
-    pub narrow: Tail<bool>,
 }
 
 /// A piece of an FPGA bitstream.
@@ -185,21 +181,6 @@ pub enum DeviceMessage<'a> {
     /// A report of the crash that ended the firmware's last start: once, after the first `Hello`.
     #[serde(borrow)]
     Crash(CrashReport<'a>),
-}
-
-impl<'a> DeviceMessage<'a> {
-    /// The first protocol version that has this message. A session of an older version does not carry it.
-    #[must_use]
-    pub const fn since(&self) -> u16 {
-        match self {
-            Self::Reply(Reply { outcome: Err(Refusal::Unknown), .. }) => 2,
-            Self::Frame(Frame { samples, .. }) if matches!(samples.width(), Width::Bits24) => {
-                Width::NARROW_SINCE
-            }
-            Self::Reply(_) | Self::Frame(_) | Self::Raw(_) | Self::Depth(_) | Self::Crash(_) => 1,
-            Self::Event(event) => event.kind.since(),
-        }
-    }
 }
 
 /// The answer to the request of the same number.
@@ -254,8 +235,8 @@ pub struct Identity<'a> {
     pub adc_bits: u8,
     /// Wavelength of the LEDs in nm.
     pub wavelength_nm: u16,
-    /// What the device can do. Since version 2.
-    pub capabilities: Tail<Capabilities>,
+    /// What the device can do.
+    pub capabilities: Capabilities,
 }
 
 /// What a camera can do, one bit each.
@@ -271,20 +252,12 @@ impl Capabilities {
     pub const BOOTLOADER: Self = Self(1 << 2);
     /// The FPGA runs the bring-up design: there is no ADC, and samples are made of the levels of the LED lines.
     pub const BRING_UP: Self = Self(1 << 3);
-    /// The camera sends samples of 24 bits to a host that asks for them ([`Configuration::narrow`]). A camera says so in
-    /// sessions of version 4 and later.
-    pub const NARROW_SAMPLES: Self = Self(1 << 4);
-
-    /// The first protocol version that has capabilities.
-    pub const SINCE: u16 = 2;
-
     /// Name of every capability, by bit.
-    pub const NAMES: [(Self, &'static str); 5] = [
+    pub const NAMES: [(Self, &'static str); 4] = [
         (Self::DEPTH, "depth"),
         (Self::LOAD_GATEWARE, "load gateware"),
         (Self::BOOTLOADER, "boot loader"),
         (Self::BRING_UP, "bring-up"),
-        (Self::NARROW_SAMPLES, "24-bit samples"),
     ];
 
     /// Whether all bits of `other` are set.
@@ -336,7 +309,7 @@ pub enum Refusal {
     Unsupported,
     /// The FPGA did not answer on its bus.
     Bus,
-    /// The device does not know this command: the host speaks a newer version. Since version 2.
+    /// The device does not know this command: the host speaks a newer version.
     Unknown,
 }
 
@@ -474,7 +447,7 @@ pub struct Frame<'a> {
     pub sweeps: u32,
     /// What happened to the frame.
     pub flags: FrameFlags,
-    /// Summed ADC counts, one a pattern shown; of 24 bits in a run for which the host asked for them.
+    /// Summed ADC counts, one a pattern shown; of 24 bits in a run in which no sample can leave 24 bits.
     #[serde(borrow)]
     pub samples: Samples<'a>,
 }
@@ -544,22 +517,10 @@ pub enum EventKind {
     /// The host sent bytes that are not a command.
     CommandDamaged,
     /// Register accesses between firmware and FPGA came damaged and were repeated. At most once a second.
-    /// Since version 2.
     FpgaAccessesDamaged {
         /// All since power-up.
         total: u32,
     },
-}
-
-impl EventKind {
-    /// The first protocol version that has this event.
-    #[must_use]
-    pub const fn since(&self) -> u16 {
-        match self {
-            Self::Fault(_) | Self::RunEnded { .. } | Self::RawDropped | Self::CommandDamaged => 1,
-            Self::FpgaAccessesDamaged { .. } => 2,
-        }
-    }
 }
 
 /// State, counters and sensors of the device.
@@ -593,8 +554,8 @@ pub struct Status {
     pub leds_on: bool,
     /// Whether the interlock is closed.
     pub interlock_closed: bool,
-    /// What the detector saw lately; `None` before a run has shown two frames. Since version 2.
-    pub signal: Tail<Option<Signal>>,
+    /// What the detector saw lately; `None` before a run has shown two frames.
+    pub signal: Option<Signal>,
 }
 
 /// What the detector saw in two successive frames of this run or the last one, for alignment and gain. Counts are those of
@@ -612,11 +573,6 @@ pub struct Signal {
     pub snr_centi_db: i16,
     /// Samples outside the ADC's range, in millionths of all samples of the second frame.
     pub over_range_ppm: u32,
-}
-
-impl Signal {
-    /// The first protocol version that has a signal.
-    pub const SINCE: u16 = 2;
 }
 
 /// Outcome of the device's checks, one bit each.

@@ -14,7 +14,7 @@
 //! | 10 | device time in us | padded |
 //! | 5 | sweeps | padded |
 //! | 3 | [`FrameFlags`] | padded |
-//! | 1 | 0: 32 bits and no shift; [`NARROW`]: 24 bits | byte |
+//! | 1 | 0: 32 bits; [`NARROW`]: 24 bits | byte |
 //! | 2 | 4 M or 3 M, for M patterns | padded |
 //! | 4 M or 3 M | positive less negative sum of each pattern in the order shown | little-endian, signed |
 //! | 4 | CRC-32 of all before | little-endian |
@@ -36,8 +36,8 @@ use core::ops::{Range, RangeInclusive};
 /// Bytes before the samples.
 pub const HEADER_BYTES: usize = 30;
 
-/// Most ADC samples in a sum with which no difference of two sums can leave 32 bits: the shift of
-/// [`Samples`](crate::Samples) is then always 0.
+/// Most ADC samples in a sum with which no difference of two sums can leave 32 bits. A camera refuses a configuration
+/// with more.
 pub const MAX_SUMMED_SAMPLES: u32 = 1 << 17;
 
 // One sweep at the fastest rate is far from it, and the largest sum is in range.
@@ -52,7 +52,7 @@ const _: () = assert!(MAX_NARROW_SAMPLES * (crate::ADC_MAX as u32) < 1 << 23);
 const _: () = assert!((MAX_NARROW_SAMPLES + 1) * (crate::ADC_MAX as u32) >= 1 << 23);
 
 /// Most zeros before a packet, at the fastest `sck` that the host port allows: the FPGA begins when it has so many bytes
-/// of the packet that it never has to wait. Gateware before 0.3.4 takes 5.3 us for that.
+/// of the packet that it never has to wait.
 pub const LEAD_BYTES: usize = 64;
 
 /// Most zeros before a packet that is read at [`PACKET_SCK_MAX_HZ`](crate::host_port::PACKET_SCK_MAX_HZ).

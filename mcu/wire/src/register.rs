@@ -82,7 +82,7 @@ registers! {
     /// Always [`IDENTITY`].
     Identity = 0x00, ReadOnly, IDENTITY;
     /// Gateware version, `major << 16 | minor << 8 | patch`.
-    Version = 0x01, ReadOnly, 0x0000_0307;
+    Version = 0x01, ReadOnly, 0x0000_0400;
     /// Holds what was written, for bus tests.
     Scratch = 0x02, ReadWrite, 0;
     /// See [`control`].
@@ -141,7 +141,7 @@ registers! {
     /// High word of that time.
     TimeHigh = 0x1A, ReadWrite, 0;
     /// Sum of all samples of the delivered frame that were not blanked, low word; modulo 2^64, however its
-    /// sums wrapped. 0 while no frame is delivered. Since gateware 0.3.2, like the next two.
+    /// sums wrapped. 0 while no frame is delivered.
     SumLow = 0x1B, ReadOnly, 0;
     /// High word of that sum.
     SumHigh = 0x1C, ReadOnly, 0;
@@ -149,7 +149,7 @@ registers! {
     /// delivered.
     OverRange = 0x1D, ReadOnly, 0;
     /// The result of the last scan of the ADC's sampling phase, see [`sampling`]. 0 before the first scan is
-    /// over, and on a board that has none. Since gateware 0.3.7.
+    /// over, and on a board that has none.
     Sampling = 0x1E, ReadOnly, 0;
 }
 
@@ -168,45 +168,7 @@ pub const fn has_this_map(version: u32) -> bool {
     version >> 8 == Register::Version.reset() >> 8
 }
 
-/// Whether gateware with this [`Register::Version`] knows [`mode::PACKETS`]: 0.3.1 and later of the same map.
-#[must_use]
-pub const fn sends_packets(version: u32) -> bool {
-    has_this_map(version) && version & 0xFF >= 1
-}
-
-/// Whether gateware with this [`Register::Version`] has what a packet leaves out of its frame in
-/// [`Register::SumLow`], [`Register::SumHigh`] and [`Register::OverRange`]: 0.3.2 and later of the same map.
-#[must_use]
-pub const fn measures_frames(version: u32) -> bool {
-    has_this_map(version) && version & 0xFF >= 2
-}
-
-/// Whether gateware with this [`Register::Version`] knows
-/// [`READ_PACKET`](crate::host_port::READ_PACKET): 0.3.4 and later of the same map.
-#[must_use]
-pub const fn clocks_packets(version: u32) -> bool {
-    has_this_map(version) && version & 0xFF >= 4
-}
-
-/// Whether gateware with this [`Register::Version`] knows [`mode::NARROW`]: 0.3.5 and later of the same map.
-#[must_use]
-pub const fn narrows_packets(version: u32) -> bool {
-    has_this_map(version) && version & 0xFF >= 5
-}
-
-/// Whether gateware with this [`Register::Version`] knows [`mode::PARALLEL`]: 0.3.6 and later of the same map.
-#[must_use]
-pub const fn has_parallel_port(version: u32) -> bool {
-    has_this_map(version) && version & 0xFF >= 6
-}
-
-/// Whether gateware with this [`Register::Version`] has [`Register::Sampling`]: 0.3.7 and later of the same map.
-#[must_use]
-pub const fn scans_the_phase(version: u32) -> bool {
-    has_this_map(version) && version & 0xFF >= 7
-}
-
-/// Frames that can wait for the host, the delivered one included. Gateware before 0.3.3 has room for one.
+/// Frames that can wait for the host, the delivered one included.
 pub const WAITING_FRAMES: usize = 2;
 /// Address of the order table's first entry; entry `i` is at `ORDER_TABLE + i`, read and write, 10
 /// bits.
@@ -368,12 +330,12 @@ pub mod mode {
     pub const ORDER_TABLE: u32 = 1 << 2;
     /// Samples from the test generator instead of the ADC.
     pub const TEST_SOURCE: u32 = 1 << 3;
-    /// Frames are sent as packets of the host's link ([`ready`](crate::ready)). Since gateware 0.3.1.
+    /// Frames are sent as packets of the host's link ([`ready`](crate::ready)).
     pub const PACKETS: u32 = 1 << 4;
     /// Samples of packets have 24 bits instead of 32: the lower bits of the difference. Without `PACKETS` the bit
-    /// changes nothing. Since gateware 0.3.5.
+    /// changes nothing.
     pub const NARROW: u32 = 1 << 5;
-    /// Packets leave by the parallel port. A start with this bit and without `PACKETS` is refused. Since gateware 0.3.6.
+    /// Packets leave by the parallel port. A start with this bit and without `PACKETS` is refused.
     pub const PARALLEL: u32 = 1 << 6;
     /// Every bit that has a meaning; a start with any other is refused.
     pub const DEFINED: u32 =

@@ -6,7 +6,7 @@ mod strategies;
 
 use nirspi_wire::{
     Command, Configuration, Deframed, Deframer, DeviceMessage, Frame, FrameFlags, GatewareChunk,
-    PatternOrder, Request, SampleSource, Samples, Tail, encode,
+    PatternOrder, Request, SampleSource, Samples, encode,
     message::GATEWARE_CHUNK_MAX,
     open,
     packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET, PacketError, overhead, seal, unseal},
@@ -163,11 +163,7 @@ proptest! {
         let mut bytes = seal(&payload, &mut [0; ROOM]).unwrap().to_vec();
         let mut room = [0; ROOM];
         let numbers = values.iter().map(|&value| i64::from(value));
-        let samples = match width {
-            Width::Bits32 => Samples::pack(numbers, &mut room),
-            Width::Bits24 => Samples::pack_narrow(numbers, &mut room),
-        };
-        let samples = samples.unwrap();
+        let samples = Samples::pack(numbers, width, &mut room).unwrap();
         let frame = Frame { run, sequence, device_time_us, sweeps, flags, samples };
         let length = bytes.len() - 1;
         let opened: DeviceMessage<'_> = open(&mut bytes[..length]).unwrap();
@@ -371,7 +367,6 @@ fn the_largest_messages_fit_the_largest_packets() {
         sweeps: u32::MAX,
         source: SampleSource::TestPattern,
         over_range_trip: u32::MAX,
-        narrow: Tail(Some(true)),
     };
     let chunk = GatewareChunk {
         offset: u32::MAX,
@@ -385,14 +380,14 @@ fn the_largest_messages_fit_the_largest_packets() {
     }
 
     let mut buffer = [0; 4096];
-    let values = (0u16..1024).map(|k| (1i64 << 48) - 1 - (i64::from(k) << 30));
+    let values = (0u16..1024).map(|k| i64::from(i32::MAX) - (i64::from(k) << 16));
     let frame = DeviceMessage::Frame(Frame {
         run: u16::MAX,
         sequence: u32::MAX,
         device_time_us: u64::MAX,
         sweeps: u32::MAX,
         flags: FrameFlags(u16::MAX),
-        samples: Samples::pack(values, &mut buffer).unwrap(),
+        samples: Samples::pack(values, Width::Bits32, &mut buffer).unwrap(),
     });
     encode(&frame, &mut [0; MAX_DEVICE_PACKET]).expect("no room for a device's packet");
 }

@@ -150,7 +150,6 @@ local commands = {
         r:number("sweeps")
         r:variant("source", SampleSource)
         r:number("over_range_trip")
-        if r:left() > 0 then r:flag("narrow") end
     end,
     Start = function(r)
         if r:variant("length", RunLength) == "Frames" then r:number("frames") end
@@ -177,7 +176,7 @@ local answers = {
         r:number("adc_hz")
         r:byte("adc_bits")
         r:number("wavelength_nm")
-        if r:left() > 0 then r:number("capabilities") end
+        r:number("capabilities")
     end,
     Status = function(r)
         r:variant("state", State)
@@ -191,7 +190,7 @@ local answers = {
         r:number("duty_permille")
         r:flag("leds_on")
         r:flag("interlock_closed")
-        if r:left() > 0 and r:flag("signal known") == "yes" then
+        if r:flag("signal known") == "yes" then
             for _, name in ipairs({ "mean_milli_counts", "signal_milli_counts", "noise_milli_counts" }) do
                 r:number(name)
             end
@@ -242,8 +241,8 @@ local function frame(r)
     r:number("device_time_us")
     r:number("sweeps")
     r:number("flags")
-    -- 0x80 stands for samples of 24 bits, which have no shift.
-    local form = r:byte("shift")
+    -- 0x80 stands before samples of 24 bits, 0 before samples of 32 bits.
+    local form = r:byte("form of the samples")
     local samples = r:block("samples", form == 0x80 and 3 or 4)
     return string.format("frame %d of run %d, %d samples", sequence, run, samples)
 end

@@ -1,5 +1,5 @@
 //! Counts the instructions that one frame costs: the streaming path alone, with memory in place of
-//! the buses. Once with gateware that makes packets, and once with older gateware.
+//! the buses.
 //!
 //! Run under `-icount shift=0`, where one instruction is one nanosecond of the emulated clock, so
 //! one count of SysTick at 20 MHz is fifty instructions. The result is in instructions and not in
@@ -29,14 +29,14 @@ use nirspi_mcu::{
     BoardInfo, BusError, Camera, HostPort, Inputs, Limits, Micros, NoLoader, PacketSink, PortBus,
     Ports, Target, Wanted,
 };
-use nirspi_wire::fpga::{FpgaFrame, Header, MAX_FRAME_BYTES, Sums, frame_bytes};
+use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
-use nirspi_wire::packet::{self, MAX_DEVICE_PACKET, MAX_HOST_PACKET, encode};
+use nirspi_wire::packet::{self, MAX_HOST_PACKET, encode};
 use nirspi_wire::register::{IDENTITY, Register, control, status};
 use nirspi_wire::samples::Width;
 use nirspi_wire::{
-    Command, Configuration, DeviceMessage, Frame, FrameFlags, PATTERNS, PatternOrder, Request,
-    RunLength, SampleSource, Samples, Tail, Version, crc32, ready, version,
+    Command, Configuration, FrameFlags, PATTERNS, PatternOrder, Request, RunLength, SampleSource,
+    Version, ready, version,
 };
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -47,14 +47,11 @@ const GRAIN: u32 = 50;
 const TRANSFER_BYTES: usize = 512;
 /// Packets by the parallel port in a millisecond: as many as USB carries.
 const STREAMED: u32 = 8;
-/// Gateware that makes no packets.
-const OLDER: u32 = 0x0000_0300;
 /// Bytes of the message in a packet of the FPGA.
-const PAYLOAD_BYTES: usize = ready::HEADER_BYTES + 4 * PATTERNS as usize;
+const PAYLOAD_BYTES: usize = ready::HEADER_BYTES + 3 * PATTERNS as usize;
 
 /// A fake FPGA: registers in memory, and a frame that is ready during every run.
 struct Memory {
-    version: u32,
     registers: [u32; 32],
     running: bool,
     sequence: u32,
@@ -62,11 +59,11 @@ struct Memory {
 }
 
 impl Memory {
-    fn new(version: u32) -> Self {
+    fn new() -> Self {
         let mut registers = [0; 32];
         // With a level of 0, the signal meter would take this for a moment between two frames.
         registers[usize::from(Register::SumLow.address())] = 1;
-        Self { version, registers, running: false, sequence: 0, writes: 0 }
+        Self { registers, running: false, sequence: 0, writes: 0 }
     }
 }
 
@@ -75,29 +72,7 @@ impl Memory {
         self.registers.get_mut(usize::from(address))
     }
 
-    /// The frame that is ready now.
-    fn frame(&self, into: &mut [u8]) {
-        let header = Header {
-            patterns: PATTERNS,
-            flags: FrameFlags::DIFFERENTIAL,
-            sequence: self.sequence,
-            sweeps: 1,
-            over_range: 0,
-            lost: 0,
-            clock: u64::from(self.sequence) * 10_240,
-        };
-        let mut bytes = header.to_bytes().into_iter().chain(
-            (0..PATTERNS)
-                .flat_map(|k| Sums { positive: 8_000 + u64::from(k), negative: 7_500 }.to_bytes()),
-        );
-        let Some((body, crc)) = into.split_last_chunk_mut::<4>() else { return };
-        body.fill_with(|| bytes.next().unwrap_or(0));
-        *crc = crc32(body).to_le_bytes();
-    }
-}
-
-impl Memory {
-    /// The same frame as a packet between zeros. `payload` is room for its message.
+    /// The packet that is ready now, between zeros. `payload` is room for its message.
     fn packet(&self, payload: &mut [u8; PAYLOAD_BYTES], into: &mut [u8]) {
         let head = ready::Head {
             run: 1,
@@ -106,9 +81,12 @@ impl Memory {
             sweeps: 1,
             flags: FrameFlags::DIFFERENTIAL,
             patterns: PATTERNS,
-            width: Width::Bits32,
+            width: Width::Bits24,
         };
-        let samples = (0..i32::from(PATTERNS)).flat_map(|k| (500 + k).to_le_bytes());
+        let samples = (0..i32::from(PATTERNS)).flat_map(|k| {
+            let [low, middle, high, _] = (500 + k).to_le_bytes();
+            [low, middle, high]
+        });
         let mut bytes = head.to_bytes().into_iter().chain(samples);
         payload.fill_with(|| bytes.next().unwrap_or(0));
         into.fill(0);
@@ -137,7 +115,7 @@ impl HostPort for Memory {
         let running = if self.running { status::RUNNING | status::LEDS_ON } else { 0 };
         let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
-            Some(Register::Version) => self.version,
+            Some(Register::Version) => Register::Version.reset(),
             Some(Register::Design) => Register::Design.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             // With the frame that is ready.
@@ -167,7 +145,6 @@ const CONFIGURATION: Configuration<'static> = Configuration {
     sweeps: 1,
     source: SampleSource::Detector,
     over_range_trip: 0,
-    narrow: Tail(None),
 };
 
 const INPUTS: Inputs = Inputs { interlock_closed: true, temperature_centi_celsius: Some(2500) };
@@ -180,37 +157,6 @@ fn counts(work: impl FnOnce()) -> u32 {
     before.wrapping_sub(SYST::get_current()) & 0x00FF_FFFF
 }
 
-/// The firmware's three steps with a frame: the FPGA's checksum, the differences, the packet.
-fn parts(memory: &Memory, frame: &mut [u8]) -> [u32; 3] {
-    static WORDS: ConstStaticCell<[u8; 4 * PATTERNS as usize]> = ConstStaticCell::new([0; _]);
-    static ROOM: ConstStaticCell<[u8; MAX_DEVICE_PACKET]> = ConstStaticCell::new([0; _]);
-    let (words, room) = (WORDS.take(), ROOM.take());
-    memory.frame(frame);
-    let (mut pack, mut send) = (0, 0);
-    let check = counts(|| {
-        let _ = black_box(FpgaFrame::parse(black_box(frame)));
-    });
-    if let Ok(frame) = FpgaFrame::parse(frame) {
-        let differences = frame.sums().map(|sums| sums.difference());
-        let mut packed = None;
-        pack = counts(|| packed = Samples::pack(black_box(differences), words).ok());
-        if let Some(samples) = packed {
-            let frame = Frame {
-                run: 1,
-                sequence: 1,
-                device_time_us: 1_000_000,
-                sweeps: 1,
-                flags: frame.header.flags,
-                samples: black_box(samples),
-            };
-            send = counts(|| {
-                let _ = black_box(encode(&DeviceMessage::Frame(frame), room));
-            });
-        }
-    }
-    [check, pack, send]
-}
-
 /// What the frames of a run cost, in SysTick counts.
 #[derive(Default)]
 struct Cost {
@@ -218,8 +164,6 @@ struct Cost {
     between: u32,
     /// The same for the frame that costs least, which the signal meter does not look at.
     least: u32,
-    /// During the transfer of the next frame.
-    during: u32,
     /// On the link, up to the driver of the bus to the host.
     merging: u32,
     /// Bytes that went to the host.
@@ -229,7 +173,6 @@ struct Cost {
 /// Where a run has its memory.
 struct Room<'r> {
     frame: &'r mut [u8; MAX_FRAME_BYTES],
-    spare: &'r mut [u8; MAX_FRAME_BYTES],
     payload: &'r mut [u8; PAYLOAD_BYTES],
     command: &'r mut [u8; MAX_HOST_PACKET],
 }
@@ -247,7 +190,7 @@ fn stream(
     link: &mut CameraEnd<'_>,
     to_host: &mut HostOut<'_, TRANSFER_BYTES>,
 ) -> Cost {
-    let mut bus = PortBus::new(memory, room.frame).with_spare(Some(room.spare));
+    let mut bus = PortBus::new(memory, room.frame);
     let mut camera =
         Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::default());
     let mut now = Micros(0);
@@ -268,38 +211,20 @@ fn stream(
         let (_, sink) = link.both();
         let before = cost.between;
         let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
-        // The camera asks for the frame. Of older gateware, the camera packs the one before while this one comes.
+        // The camera asks for the frame.
         cost.between += counts(|| {
             camera.poll(now, &INPUTS, &mut ports);
         });
-        let mut packs = false;
-        match bus.wanted() {
-            Some(Wanted { port, into: Target::Bus { bytes, kept }, .. }) => {
-                port.frame(bytes);
-                if let Some(frame) = kept {
-                    cost.during += counts(|| camera.pack(now, frame, sink));
-                }
-                packs = true;
-                bus.transferred(Ok(()));
+        if let Some(Wanted { port, into: Target::Link(length), .. }) = bus.wanted() {
+            if let Some(bytes) = sink.claim(length) {
+                port.packet(room.payload, bytes);
             }
-            Some(Wanted { port, into: Target::Link(length), .. }) => {
-                if let Some(bytes) = sink.claim(length) {
-                    port.packet(room.payload, bytes);
-                }
-                bus.transferred(Ok(()));
-                let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
-                cost.between += counts(|| camera.forward(now, &mut ports));
-            }
-            None => {}
+            bus.transferred(Ok(()));
+            let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
+            cost.between += counts(|| camera.forward(now, &mut ports));
         }
         // The firmware checks the FPGA once in a millisecond: here once for each frame.
         now.0 += 1_000;
-        if packs {
-            let mut ports = Ports { bus: &mut bus, sink: &mut *sink, loader: &mut NoLoader };
-            cost.between += counts(|| {
-                camera.poll(now, &INPUTS, &mut ports);
-            });
-        }
         cost.least = cost.least.min(cost.between - before);
         cost.merging += counts(|| {
             while let Poll::Ready(transfer) = poll_once(to_host.transfer()) {
@@ -313,7 +238,6 @@ fn stream(
 #[entry]
 fn main() -> ! {
     static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
-    static SPARE: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; _]);
     static PAYLOAD: ConstStaticCell<[u8; PAYLOAD_BYTES]> = ConstStaticCell::new([0; _]);
     static COMMAND: ConstStaticCell<[u8; MAX_HOST_PACKET]> = ConstStaticCell::new([0; _]);
     static PLACES: ConstStaticCell<[Packet; 4]> = ConstStaticCell::new([Packet::EMPTY; 4]);
@@ -333,24 +257,11 @@ fn main() -> ! {
         peripherals.SYST.clear_current();
         peripherals.SYST.enable_counter();
     }
-    let mut room = Room {
-        frame: FRAME.take(),
-        spare: SPARE.take(),
-        payload: PAYLOAD.take(),
-        command: COMMAND.take(),
-    };
+    let mut room = Room { frame: FRAME.take(), payload: PAYLOAD.take(), command: COMMAND.take() };
     let (mut link, _, mut to_host) = LINK.init(Link::new(PLACES.take())).split();
-    let today = Register::Version.reset();
-    let packets = stream(Memory::new(today), &mut room, &mut link, &mut to_host);
-    let older = stream(Memory::new(OLDER), &mut room, &mut link, &mut to_host);
-    let memory = Memory::new(OLDER);
-    let [check, pack, send] = parts(&memory, room.frame);
-    // The last frame of older gateware still waits.
-    const PACKED: u32 = FRAMES - 1;
-    let least = 4 * u32::from(PATTERNS);
-    let bytes = [packets.bytes, older.bytes];
-    if bytes[0] < FRAMES * least || bytes[1] < PACKED * least {
-        hprintln!("no frames came: {:?} bytes", bytes);
+    let packets = stream(Memory::new(), &mut room, &mut link, &mut to_host);
+    if packets.bytes < FRAMES * 3 * u32::from(PATTERNS) {
+        hprintln!("no frames came: {} bytes", packets.bytes);
         exit(EXIT_FAILURE);
     }
     hprintln!("packet_link_bytes {}", packets.bytes / FRAMES);
@@ -369,14 +280,6 @@ fn main() -> ! {
     let [copied, whole] = usb::count();
     hprintln!("usb_512_copied {}", copied);
     hprintln!("usb_whole_packet {}", whole);
-    hprintln!("fpga_bytes {}", frame_bytes(PATTERNS));
-    hprintln!("link_bytes {}", older.bytes / PACKED);
-    hprintln!("between_transfers {}", older.between * GRAIN / FRAMES);
-    hprintln!("during_transfer {}", older.during * GRAIN / PACKED);
-    hprintln!("merging {}", older.merging * GRAIN / PACKED);
-    hprintln!("of_these_check {}", check * GRAIN);
-    hprintln!("of_these_differences {}", pack * GRAIN);
-    hprintln!("of_these_packet {}", send * GRAIN);
     exit(EXIT_SUCCESS);
     panic!("the emulator goes on after its exit");
 }

@@ -136,7 +136,6 @@ impl World {
             board: FakeBoard(Rc::clone(&pins)),
             port: if chip == Chip::Ring { port.with_ring() } else { port },
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
-            spare: Some(Box::leak(Box::new([0; MAX_FRAME_BYTES]))),
             loader: NoLoader,
             info,
             limits: Limits::default(),

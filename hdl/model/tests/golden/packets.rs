@@ -4,6 +4,7 @@ use crate::bench::{Bench, random_sample};
 use crate::oracle::setup;
 use nirspi_wire::fpga::Sums;
 use nirspi_wire::register::{Register, control, mode, status};
+use nirspi_wire::samples::Width;
 use nirspi_wire::{DeviceMessage, Frame, Samples, open};
 use proptest::prelude::*;
 
@@ -56,10 +57,8 @@ proptest! {
             let differences = expected.sums.iter().map(Sums::difference);
             let mut words = vec![0; 4 * expected.sums.len()];
             let header = expected.header;
-            let samples = match narrow {
-                true => Samples::pack_narrow(differences, &mut words).unwrap(),
-                false => Samples::pack(differences, &mut words).unwrap(),
-            };
+            let width = if narrow { Width::Bits24 } else { Width::Bits32 };
+            let samples = Samples::pack(differences, width, &mut words).unwrap();
             let frame = Frame {
                 run: run as u16,
                 sequence: f,

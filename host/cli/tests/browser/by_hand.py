@@ -68,7 +68,7 @@ def message(given):
     }
     state["camera"]["versions"] = [
         {"name": "firmware", "camera": "1.2.3", "expected": "1.3.0", "advice": "update the firmware"},
-        {"name": "gateware", "camera": "0.3.7", "expected": "0.3.7", "advice": None},
+        {"name": "gateware", "camera": "0.4.0", "expected": "0.4.0", "advice": None},
     ]
     state["camera"]["measurement"] = {
         "patterns": 512,
@@ -248,7 +248,7 @@ def facts(browser, address):
     assert rows(page, "identity") == [
         ["address", "usb:77", ""],
         ["firmware", "1.2.3, expected 1.3.0", "loss"],
-        ["gateware", "0.3.7", ""],
+        ["gateware", "0.4.0", ""],
         ["LEDs", "1551 nm", ""],
         ["ADC", "125 MS/s, 14 bit", ""],
         ["patterns", "512 of 1\u202f024", ""],

@@ -7,6 +7,7 @@ use nirspi::session::CameraIdentity;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
+use nirspi_wire::samples::Width;
 use nirspi_wire::{DeviceMessage, Frame, FrameFlags, Samples, encode};
 
 /// Reconstructs a file of these bytes, which must fail and leave nothing behind.
@@ -157,7 +158,9 @@ fn crafted(bench: &Bench, name: &str, setup: &MeasurementSetup, settling: &Settl
     let mut recorder =
         Recorder::create(&target, &identity, setup, Some(settling), Some(7)).unwrap();
     let (mut words, mut packet) = ([0; 8192], vec![0; MAX_DEVICE_PACKET + 1]);
-    let samples = Samples::pack((0..1024_i32).map(|k| i64::from(5000 - k)), &mut words).unwrap();
+    let samples =
+        Samples::pack((0..1024_i32).map(|k| i64::from(5000 - k)), Width::Bits32, &mut words)
+            .unwrap();
     let flags = FrameFlags::DIFFERENTIAL;
     let frame = Frame { run: 7, sequence: 0, device_time_us: 1, sweeps: 1, flags, samples };
     recorder.packet(encode(&DeviceMessage::Frame(frame), &mut packet).unwrap()).unwrap();

@@ -3,10 +3,11 @@
 
 use crate::bench::{Bench, Outcome};
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
+use nirspi_wire::samples::Width;
 use nirspi_wire::{
-    Answer, Command, Deframed, Deframer, DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags,
-    Identity, Refusal, Reply, Request, Samples, State, Status, Tail, Version, encode, open,
-    version,
+    Answer, Capabilities, Command, Deframed, Deframer, DeviceMessage, Event, EventKind, Fault,
+    Frame, FrameFlags, Identity, Refusal, Reply, Request, Samples, State, Status, Version, encode,
+    open, version,
 };
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -138,7 +139,7 @@ impl Camera {
             duty_permille: 0,
             leds_on: false,
             interlock_closed: fault.is_none(),
-            signal: Tail(None),
+            signal: None,
         }
     }
 
@@ -178,7 +179,8 @@ impl Camera {
     fn frame(&mut self, run: u16, sequence: u32, damaged: bool) -> std::io::Result<()> {
         let mut buffer = [0; 8192];
         let samples =
-            Samples::pack((0..1024_i32).map(|k| i64::from(5000 - k)), &mut buffer).unwrap();
+            Samples::pack((0..1024_i32).map(|k| i64::from(5000 - k)), Width::Bits32, &mut buffer)
+                .unwrap();
         let flags = FrameFlags::DIFFERENTIAL;
         let frame = Frame { run, sequence, device_time_us: 1, sweeps: 1, flags, samples };
         self.send(DeviceMessage::Frame(frame), damaged)
@@ -207,7 +209,7 @@ const IDENTITY: Identity<'static> = Identity {
     adc_hz: 125_000_000,
     adc_bits: 14,
     wavelength_nm: 1550,
-    capabilities: Tail(None),
+    capabilities: Capabilities(0),
 };
 
 /// Captures 50 frames of it into `rec.mcap`.

@@ -3,8 +3,8 @@
 use crate::bench::Bench;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::{
-    Answer, Deframed, Deframer, DeviceMessage, Identity, Refusal, Reply, Request, Tail, Version,
-    encode, open,
+    Answer, Capabilities, Deframed, Deframer, DeviceMessage, Identity, Refusal, Reply, Request,
+    Version, encode, open,
 };
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -70,7 +70,7 @@ fn a_camera_of_a_future_protocol_is_told_apart_with_both_versions() {
             adc_hz: 250_000_000,
             adc_bits: 16,
             wavelength_nm: 1550,
-            capabilities: Tail(None),
+            capabilities: Capabilities::default(),
         }))
     };
     let words = ["protocol version 99", "versions 1 to 4", "update this program"];

@@ -49,9 +49,9 @@ fn a_calibration_of_another_camera_or_gateware_is_refused() {
         .failed(1, &["mine.json", "serial number virtual-1", "virtual-2", "nirspi calibrate"]);
     let serial = bench.json("mine.json")["camera"]["serial"].as_str().unwrap().to_owned();
     let mut text = std::fs::read_to_string(bench.path("mine.json")).unwrap();
-    text = text.replace(r#""gateware": "0.3.7""#, r#""gateware": "0.0.1""#);
+    text = text.replace(r#""gateware": "0.4.0""#, r#""gateware": "0.0.1""#);
     bench.write("mine.json", text.as_bytes());
-    capture(&["--calibration", "mine.json"]).failed(1, &["gateware 0.0.1", "0.3.7"]);
+    capture(&["--calibration", "mine.json"]).failed(1, &["gateware 0.0.1", "0.4.0"]);
     capture(&["--calibration", "none.json"]).failed(1, &["none.json"]);
     assert_eq!(bench.names(), ["mine.json"]);
 

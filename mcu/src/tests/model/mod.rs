@@ -48,7 +48,7 @@ impl Graph {
             depth: 0,
         };
         let mut seen = HashMap::new();
-        let start = World::new(actions.contains(&Action::Pack), walk.packets);
+        let start = World::new();
         seen.insert(start.key(), 0);
         graph.notes.push(start.note());
         graph.parents.push((NONE, 0));
@@ -174,8 +174,6 @@ struct Walk {
     troubles: u32,
     /// How many commands may wait for their replies at a time.
     window: usize,
-    /// The gateware makes packets.
-    packets: bool,
 }
 
 /// The actions of every walk, more, and the beginning and end of these troubles.
@@ -189,17 +187,17 @@ fn with(more: &[Action], troubles: &[Trouble]) -> Vec<Action> {
 }
 
 fn walk(name: &'static str, actions: Vec<Action>, troubles: u32, window: usize) -> Walk {
-    Walk { name, actions, troubles, window, packets: false }
+    Walk { name, actions, troubles, window }
 }
 
-/// Walks of a board that packs each frame before it asks for the next.
-fn walks_of_one_buffer() -> Vec<Walk> {
+fn walks() -> Vec<Walk> {
     use Action::*;
     use Trouble::*;
     vec![
         walk("one host, nothing fails", with(&[SelfTest, Burst], &[LinkFull]), 1, 2),
         walk("the FPGA fails", with(&[Reset, Latch, Spoil], &[BusDead, BusDeaf, NoClock]), 1, 1),
         walk("two failures of the bus", with(&[], &[BusDead, BusDeaf]), 2, 1),
+        walk("a full link", with(&[Spoil, SelfTest], &[LinkFull, Interlock]), 1, 1),
         walk(
             "sensors and link",
             with(&[], &[Interlock, FpgaInterlock, Hot, Warm, NoSensor, LinkFull]),
@@ -220,52 +218,9 @@ fn walks_of_one_buffer() -> Vec<Walk> {
     ]
 }
 
-/// Walks of a board that packs a frame while it transfers the next.
-fn walks_of_two_buffers() -> Vec<Walk> {
-    use Action::*;
-    use Trouble::*;
-    vec![
-        walk(
-            "two buffers, the FPGA fails",
-            with(&[Pack, Reset, Latch, Spoil], &[BusDead, BusDeaf, NoClock]),
-            1,
-            1,
-        ),
-        walk("two buffers, two failures of the bus", with(&[Pack], &[BusDead, BusDeaf]), 2, 1),
-        walk("two buffers, a full link", with(&[Pack, Spoil], &[LinkFull, Interlock]), 1, 1),
-    ]
-}
-
-/// Walks of a board whose gateware makes packets.
-fn walks_of_packets() -> Vec<Walk> {
-    use Action::*;
-    use Trouble::*;
-    let walks = vec![
-        walk(
-            "packets, the FPGA fails",
-            with(&[Reset, Latch, Spoil], &[BusDead, BusDeaf, NoClock]),
-            1,
-            1,
-        ),
-        walk("packets, two failures of the bus", with(&[], &[BusDead, BusDeaf]), 2, 1),
-        walk("packets, a full link", with(&[Spoil, SelfTest], &[LinkFull, Interlock]), 1, 1),
-    ];
-    walks.into_iter().map(|walk| Walk { packets: true, ..walk }).collect()
-}
-
-#[test]
-fn every_reachable_state_keeps_the_laws_of_light_with_packets() {
-    hold(walks_of_packets());
-}
-
 #[test]
 fn every_reachable_state_keeps_the_laws_of_light() {
-    hold(walks_of_one_buffer());
-}
-
-#[test]
-fn every_reachable_state_keeps_the_laws_of_light_with_a_second_buffer() {
-    hold(walks_of_two_buffers());
+    hold(walks());
 }
 
 fn hold(walks: Vec<Walk>) {

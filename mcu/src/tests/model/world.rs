@@ -5,7 +5,7 @@ use crate::notices::Notice;
 use crate::tests::support::{Bench, GOOD_INPUTS, SMALL, packet};
 use crate::{Camera, Crash, Limits, Micros};
 use nirspi_wire::packet::{encode, open};
-use nirspi_wire::register::{self, FaultCode, Register, mode};
+use nirspi_wire::register::{FaultCode, Register};
 use nirspi_wire::{
     Answer, Command, Configuration, DeviceMessage, EventKind, GatewareChunk, RebootInto, Reply,
     RunLength, State, crc32, version,
@@ -62,8 +62,6 @@ pub enum Action {
     Latch,
     /// The firmware crashes and restarts. The FPGA goes on.
     Crash,
-    /// The board packs the kept frame, while it transfers the next one.
-    Pack,
     Begin(Trouble),
     End(Trouble),
 }
@@ -127,9 +125,8 @@ fn age(now: Micros) -> impl Fn(Micros) -> u64 + Copy {
 }
 
 impl World {
-    /// Power-up, and the first poll. `keeps`: the bus has memory for a second frame; `packets`: the gateware is that
-    /// of today, which makes packets and lets two frames wait.
-    pub fn new(keeps: bool, packets: bool) -> Self {
+    /// Power-up, and the first poll.
+    pub fn new() -> Self {
         let limits = Limits {
             host_silence: Micros(2 * TICK),
             stall_min: Micros(TICK + TICK / 2),
@@ -137,11 +134,6 @@ impl World {
         };
         let mut bench = Bench::new();
         bench.camera = Camera::new(bench.camera.machine().info.clone(), limits);
-        bench.fpga.keeps = keeps;
-        if packets {
-            bench.fpga.make_packets();
-            bench.fpga.two_wait = true;
-        }
         let mut world =
             Self { bench, troubles: 0, seen: Seen::default(), last_command: Micros(0), starved: 0 };
         world.poll().expect("a camera after power-up");
@@ -161,7 +153,6 @@ impl World {
             Action::Close => !matches!(self.bench.camera.machine().session, Session::Closed),
             Action::Frame => fpga.running && fpga.made < FRAMES,
             Action::Spoil => fpga.frame.is_some(),
-            Action::Pack => fpga.kept.is_some(),
             Action::Latch => fpga.fault == FaultCode::None,
             Action::Begin(trouble) => {
                 !self.stands(trouble) && self.troubles.count_ones() < troubles
@@ -194,11 +185,6 @@ impl World {
                     frame[33] ^= 0x10;
                 }
                 Ok(())
-            }
-            Pack => {
-                let Bench { camera, fpga, link, now, .. } = &mut self.bench;
-                camera.pack(*now, &fpga.kept.take().unwrap_or_default(), link);
-                self.hear()
             }
             Reset => {
                 self.bench.fpga.reset();
@@ -488,12 +474,7 @@ impl World {
         let machine = camera.machine();
         let age = age(*now);
         (self.troubles, self.seen, self.starved).hash(hash);
-        match machine.session {
-            Session::Closed => 0u16,
-            Session::Foreign => 1,
-            Session::Open { protocol } => 2 + protocol,
-        }
-        .hash(hash);
+        (machine.session as u8).hash(hash);
         for notice in machine.notices.iter() {
             match *notice {
                 Notice::Reply { id, outcome } => {
@@ -552,15 +533,9 @@ impl World {
                 head.is_some().hash(hash);
             }
         }
-        fpga.kept.as_ref().filter(|_| in_run).map(|frame| &frame[seen]).hash(hash);
         // Whether the FPGA holds the settings of the only configuration decides whether it starts.
         if machine.setup.is_some() {
-            let mut configured = crate::configure::check(&SMALL, &machine.limits).ok();
-            if let Some(setup) = &mut configured
-                && register::measures_frames(fpga.get(Register::Version))
-            {
-                setup.mode |= mode::PACKETS;
-            }
+            let configured = crate::configure::check(&SMALL, &machine.limits).ok();
             let held = [Register::Patterns, Register::Dwell, Register::Mode, Register::Watchdog]
                 .map(|register| fpga.get(register));
             (held, machine.setup == configured).hash(hash);

@@ -27,10 +27,8 @@ pub struct Wired {
 impl Wired {
     pub fn new() -> Self {
         let memory: &'static RingMemory<WORDS> = Box::leak(Box::new(RingMemory::new()));
-        let mut port = Port::default();
-        port.fpga.make_packets();
         Self {
-            port,
+            port: Port::default(),
             ring: Ring::new(memory),
             memory,
             outgoing: VecDeque::new(),

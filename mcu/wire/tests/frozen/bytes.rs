@@ -1,17 +1,18 @@
 //! Messages, payloads and packets as hexadecimal text; what makes a payload a packet is written out here again.
 
-use nirspi_wire::{Samples, encode, open, samples::Words};
+use nirspi_wire::samples::{Width, Words};
+use nirspi_wire::{Samples, encode, open};
 use serde::{Deserialize, Serialize};
 
 pub fn words(bytes: &'static [u8]) -> Words<'static> {
     Words::from_le_bytes(bytes).unwrap()
 }
 
-pub fn samples(values: &[i64]) -> Samples<'static> {
-    Samples::pack(values.iter().copied(), vec![0; 4 * values.len()].leak()).unwrap()
+pub fn samples(width: Width, values: &[i64]) -> Samples<'static> {
+    Samples::pack(values.iter().copied(), width, vec![0; 4 * values.len()].leak()).unwrap()
 }
 
-pub fn hex(bytes: &[u8]) -> String {
+fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
 }
 

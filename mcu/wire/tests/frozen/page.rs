@@ -1,6 +1,6 @@
 //! `docs/protocol.md` is written from the definitions of the messages and from their frozen bytes. `NIRSPI_BLESS=1` writes it.
 
-use super::{v1, v2, v4};
+use super::v1;
 use nirspi_wire::version;
 use std::fmt::Write;
 use std::path::Path;
@@ -39,8 +39,7 @@ How [postcard](https://postcard.jamesmunns.com/wire-format) writes a value:
 | `Result` | 0 and the value, or 1 and the error |
 | `&str`, bytes | the length in bytes, then the bytes |
 | `Words` | the length in bytes, then little-endian 16-bit words |
-| `Samples` | one byte `shift`, the length in bytes, then little-endian signed 32-bit words; a sample is `word << shift`. Or the byte 0x80, the length in bytes, then little-endian signed 24-bit words; a sample is `word` (since version 4) |
-| `Tail` | the value, or nothing where the version of the session does not have it |
+| `Samples` | the byte 0 or 0x80, the length in bytes, then little-endian signed words: of 32 bits after 0, of 24 bits after 0x80 |
 ";
 
 /// What stands before a type in the source.
@@ -175,11 +174,10 @@ fn page() -> String {
         }
     }
     page += "\n## Bytes\n\nBytes of messages before CRC and COBS, in hexadecimal, as the tests freeze them.\n\n```text\n";
-    for (request, bytes) in v1::requests().into_iter().chain(v4::requests()) {
+    for (request, bytes) in v1::requests() {
         writeln!(page, "{bytes}\n    {request:?}").unwrap();
     }
-    let later = v2::device_messages().into_iter().chain(v4::device_messages());
-    for (message, bytes) in v1::device_messages().into_iter().chain(later) {
+    for (message, bytes) in v1::device_messages() {
         writeln!(page, "{bytes}\n    {message:?}").unwrap();
     }
     page + "```\n"

@@ -6,8 +6,9 @@ use nirspi_wire::{
     Answer, Capabilities, Command, ConfigField, ConfigProblem, Configuration, CrashReport, Depth,
     DeviceMessage, Event, EventKind, Fault, Frame, FrameFlags, GatewareChunk, Identity,
     PatternOrder, Raw, RebootInto, Refusal, Reply, Request, RunLength, SampleSource, Samples,
-    SelfTestReport, Signal, State, Status, Tail, Version, message::GATEWARE_CHUNK_MAX,
-    samples::Words,
+    SelfTestReport, Signal, State, Status, Version,
+    message::GATEWARE_CHUNK_MAX,
+    samples::{Width, Words},
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -28,18 +29,17 @@ fn words(most: usize) -> impl Strategy<Value = Words<'static>> {
     })
 }
 
+pub fn width() -> impl Strategy<Value = Width> {
+    prop_oneof![Just(Width::Bits32), Just(Width::Bits24)]
+}
+
 fn samples() -> impl Strategy<Value = Samples<'static>> {
-    let values = length(1024).prop_flat_map(|n| vec(-(1i64 << 48)..(1i64 << 48), n));
-    (values, 0u32..48, any::<bool>()).prop_map(|(values, shift, narrow)| {
+    let values = length(1024).prop_flat_map(|n| vec(any::<i32>(), n));
+    (values, width()).prop_map(|(values, width)| {
         let buffer = vec![0; 4 * values.len()].leak();
-        let shift = if narrow { shift.max(25) } else { shift };
-        let values = values.iter().map(|value| value >> shift).collect::<Vec<i64>>().into_iter();
-        let packed = if narrow {
-            Samples::pack_narrow(values, buffer)
-        } else {
-            Samples::pack(values, buffer)
-        };
-        packed.unwrap()
+        let fewer_bits = 8 * (4 - width.bytes());
+        Samples::pack(values.iter().map(|value| i64::from(value >> fewer_bits)), width, buffer)
+            .unwrap()
     })
 }
 
@@ -61,11 +61,10 @@ prop_compose! {
         (patterns, clocks_per_pattern, blanked) in any::<(u16, u16, u16)>(),
         (differential, adc_latency, sweeps, over_range_trip) in any::<(bool, u8, u32, u32)>(),
         source in prop_oneof![Just(SampleSource::Detector), Just(SampleSource::TestPattern)],
-        narrow in any::<Option<bool>>(),
     ) -> Configuration<'static> {
         Configuration {
             order, patterns, differential, clocks_per_pattern, blanked, adc_latency, sweeps, source,
-            over_range_trip, narrow: Tail(narrow),
+            over_range_trip,
         }
     }
 }
@@ -161,11 +160,11 @@ prop_compose! {
     fn identity()(
         firmware in version(), gateware in version(), board in text(), serial in text(),
         (protocol, side, adc_hz, adc_bits, wavelength_nm) in any::<(u16, u8, u32, u8, u16)>(),
-        capabilities in prop::option::of(any::<u32>()),
+        capabilities in any::<u32>(),
     ) -> Identity<'static> {
         Identity {
             protocol, firmware, gateware, board, serial, side, adc_hz, adc_bits, wavelength_nm,
-            capabilities: Tail(capabilities.map(Capabilities)),
+            capabilities: Capabilities(capabilities),
         }
     }
 }
@@ -189,12 +188,12 @@ prop_compose! {
         (fpga_frames_lost, fpga_frames_corrupt, commands_damaged) in any::<(u32, u32, u32)>(),
         (temperature_centi_celsius, duty_permille) in any::<(i16, u16)>(),
         (leds_on, interlock_closed) in any::<(bool, bool)>(),
-        signal in prop::option::of(prop::option::of(signal())),
+        signal in prop::option::of(signal()),
     ) -> Status {
         Status {
             state, fault, uptime_us, run, frames_made, frames_sent, frames_dropped,
             fpga_frames_lost, fpga_frames_corrupt, commands_damaged, temperature_centi_celsius,
-            duty_permille, leds_on, interlock_closed, signal: Tail(signal),
+            duty_permille, leds_on, interlock_closed, signal,
         }
     }
 }

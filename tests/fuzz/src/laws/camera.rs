@@ -270,7 +270,7 @@ fn answers(bytes: &[u8]) {
 fn transfer(bus: &mut PortBus<'_, AnyFpga<'_>>, camera: &mut Camera, sink: &mut Sink, now: Micros) {
     let Some(Wanted { port, into, .. }) = bus.wanted() else { return };
     match into {
-        Target::Bus { bytes, .. } => {
+        Target::Bus(bytes) => {
             bytes.fill_with(|| port.byte());
             let failed = port.byte() == 0xEE;
             bus.transferred(if failed { Err(BusError::Timeout) } else { Ok(()) });

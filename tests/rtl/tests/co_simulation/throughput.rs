@@ -9,7 +9,7 @@ use nirspi_tests_rtl::RtlPort;
 fn packets_of_the_rtl_lie_in_the_ring_and_reach_10_500_frames_a_second() {
     let port = RtlPort::with_parallel_port();
     // In so many frames the ring fills, and the FPGA begins to wait for room.
-    let seen = stretch(port, 1024, (120, 240), Processor::streaming(), true);
+    let seen = stretch(port, 1024, (120, 240), Processor::streaming());
     println!("simulated: {seen:.2?}");
     assert!(seen.frames_per_second >= 10_500.0, "{seen:?}");
     // What is neither lost nor sent lies in the ring or in the FPGA.
@@ -21,8 +21,7 @@ fn packets_of_the_rtl_lie_in_the_ring_and_reach_10_500_frames_a_second() {
 /// model; here each bit goes over a pin.
 #[test]
 fn packets_of_the_rtl_come_one_transfer_after_the_other() {
-    let seen =
-        stretch(RtlPort::bring_up_at_the_boards_sck(), 1024, (4, 6), Processor::reference(), true);
+    let seen = stretch(RtlPort::bring_up_at_the_boards_sck(), 1024, (4, 6), Processor::reference());
     println!("simulated: {seen:.1?}");
     assert!(seen.frames_per_second > 5900.0, "{seen:?}");
     assert!(seen.made - seen.lost - seen.sent <= 2, "{seen:?}");

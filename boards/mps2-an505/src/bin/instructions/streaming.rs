@@ -126,7 +126,7 @@ impl Frames {
         self.memory.packet(self.payload, self.room);
         self.memory.sequence += 1;
         MADE.store(self.memory.sequence, Ordering::Relaxed);
-        let place = ready::packet_in(self.room, PATTERNS, Width::Bits32).unwrap_or(1..1);
+        let place = ready::packet_in(self.room, PATTERNS, Width::Bits24).unwrap_or(1..1);
         let (words, _) = self.room[place.start - 1..place.end + 6].as_chunks();
         for word in words {
             let sent = SENT.fetch_add(4, Ordering::Relaxed) as usize;
@@ -173,12 +173,11 @@ pub fn count<const N: usize>(runs: [(u32, u32); N]) -> [Cost; N] {
     let (mut usb_device, endpoints) = device(Chip(driver), "", Version(0, 0, 0), memory);
     let _ = poll_once(pin!(usb_device.run()));
     let (end, commands, to_host) = LINK.init(Link::new(PACKETS.take())).split();
-    let today = Memory::new(Register::Version.reset());
+    let today = Memory::new();
     let device = Device {
         board: Still,
         port: Port { memory: today, ring: Ring::new(&RING) },
         frame: FRAME.take(),
-        spare: None,
         loader: NoLoader,
         info: BoardInfo::new("counted", "", Version(0, 0, 0)),
         limits: Limits::default(),
@@ -203,11 +202,7 @@ pub fn count<const N: usize>(runs: [(u32, u32); N]) -> [Cost; N] {
         usb::poll(executor);
         usb::send_all(executor, &STATE);
     }
-    let mut frames = Frames {
-        memory: Memory::new(Register::Version.reset()),
-        payload: PAYLOAD.take(),
-        room: ROOM.take(),
-    };
+    let mut frames = Frames { memory: Memory::new(), payload: PAYLOAD.take(), room: ROOM.take() };
     runs.map(|(packets, milliseconds)| {
         let (mut least, mut sum, mut transfers) = (u32::MAX, 0, 0);
         for _ in 0..milliseconds {
