@@ -49,11 +49,10 @@ impl About {
 /// The version, and then one fact a line.
 impl fmt::Display for About {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [oldest, newest] = self.protocol;
         writeln!(f, "{}", self.version)?;
         let unknown = "not known: a debug build, or built without git";
         writeln!(f, "commit: {}", self.commit.unwrap_or(unknown))?;
-        writeln!(f, "protocol: versions {oldest} to {newest}")?;
+        writeln!(f, "protocol: {}", version::Spoken)?;
         match self.features.is_empty() {
             true => write!(f, "features: none of {}", FEATURES.map(|(name, _)| name).join(", "))?,
             false => write!(f, "features: {}", self.features.join(", "))?,
@@ -76,7 +75,7 @@ mod tests {
     #[test]
     fn a_build_says_its_version_commit_protocol_and_features() {
         let text = About::this_build(Some("0123456789ab")).to_string();
-        let protocol = format!("\nprotocol: versions {} to {}\n", version::MIN, version::CURRENT);
+        let protocol = format!("\nprotocol: {}\n", version::Spoken);
         assert!(text.starts_with(concat!(env!("CARGO_PKG_VERSION"), "\ncommit: 0123456789ab\n")));
         assert!(text.contains(&protocol) && text.contains("\nfeatures: "), "{text}");
         assert!(About::this_build(None).to_string().contains("built without git"));

@@ -2,6 +2,7 @@
 //! configuration.
 
 use nirspi_recon::{Order, Rows, RowsError, Side};
+use nirspi_wire::ready::MAX_SUMMED_SAMPLES;
 use nirspi_wire::register::LATENCY_MAX;
 use nirspi_wire::{
     ADC_HZ, CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource, samples::Words,
@@ -58,7 +59,7 @@ impl MeasurementSetup {
             ("clocks_per_pattern", u32::from(dwell), 1, u32::from(u16::MAX)),
             ("blanked", u32::from(self.blanked), 0, u32::from(dwell.saturating_sub(1))),
             ("adc_latency", u32::from(self.adc_latency), 0, u32::from(LATENCY_MAX)),
-            ("sweeps", self.sweeps, 1, u32::MAX),
+            ("sweeps", self.sweeps, 1, self.most_sweeps()),
         ];
         match limits.into_iter().find(|(_, found, min, max)| !(min..=max).contains(&found)) {
             Some((field, found, min, max)) => Err(SetupError { field, found, min, max }),
@@ -111,11 +112,18 @@ impl MeasurementSetup {
         self.rows.len() as u64 * halves * u64::from(self.clocks_per_pattern)
     }
 
-    /// The number of sweeps that take about as long as one sweep of all patterns. Frames of so many
-    /// sweeps come as fast, and take as much light, as frames of all patterns.
+    /// The most sweeps of a frame: the sums of a frame have 32 bits. A measurement of more light has more frames.
+    #[must_use]
+    pub fn most_sweeps(&self) -> u32 {
+        MAX_SUMMED_SAMPLES / u32::from(self.window()).max(1)
+    }
+
+    /// The number of sweeps that take about as long as one sweep of all patterns, or the most that a frame can have. Frames
+    /// of so many sweeps come as fast, and take as much light, as frames of all patterns.
     #[must_use]
     pub fn sweeps_as_long_as_all(&self) -> u32 {
-        (f64::from(PATTERNS) / self.rows.len() as f64).round() as u32
+        let sweeps = (f64::from(PATTERNS) / self.rows.len() as f64).round() as u32;
+        sweeps.min(self.most_sweeps())
     }
 
     /// Duration of one frame at the ADC's rate.
@@ -188,13 +196,24 @@ mod tests {
                 MeasurementSetup { adc_latency: 64, ..sound.clone() },
                 "adc_latency is 64, expected 0 to 63",
             ),
+            (MeasurementSetup { sweeps: 0, ..sound.clone() }, "sweeps is 0, expected 1 to 43690"),
             (
-                MeasurementSetup { sweeps: 0, ..sound.clone() },
-                "sweeps is 0, expected 1 to 4294967295",
+                MeasurementSetup { sweeps: 43_691, ..sound.clone() },
+                "sweeps is 43691, expected 1 to 43690",
             ),
         ] {
             assert_eq!(changed.check().unwrap_err().to_string(), words);
         }
+    }
+
+    /// Of one pattern a sweep of all would be 1024 sweeps, and with 998 samples each their sum does not fit.
+    #[test]
+    fn the_sweeps_of_a_frame_fit_its_sums_where_nobody_says_how_many() {
+        let setup = MeasurementSetup::new(&Order::Natural, 1.0 / 1024.0).unwrap();
+        assert_eq!(setup.sweeps_as_long_as_all(), 1024);
+        let slow = setup.timed(1_000, 2);
+        assert_eq!(slow.sweeps_as_long_as_all(), (1 << 17) / 998);
+        MeasurementSetup { sweeps: slow.sweeps_as_long_as_all(), ..slow }.check().unwrap();
     }
 
     #[test]

@@ -304,9 +304,8 @@ pub enum RecordingError {
     },
     /// The recording has a newer wire protocol.
     #[error(
-        "{path}: recorded as {found}, this program reads {TOPIC:?} of nirspi-wire-v{} to v{}: update this program",
-        version::MIN,
-        version::CURRENT
+        "{path}: recorded as {found}, this program reads {TOPIC:?} of protocol {}: update this program",
+        version::Spoken
     )]
     Version {
         /// The file.

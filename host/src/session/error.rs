@@ -26,9 +26,8 @@ pub enum SessionError {
     TurnedAway,
     /// The two sides speak different versions.
     #[error(
-        "the camera speaks protocol version {camera}, this program versions {} to {}: update {}",
-        version::MIN,
-        version::CURRENT,
+        "the camera speaks protocol version {camera}, this program {}: update {}",
+        version::Spoken,
         if *.camera > version::CURRENT { "this program" } else { "the camera's firmware (nirspi flash)" }
     )]
     Version {

@@ -109,9 +109,8 @@ pub enum UpdateError {
     },
     /// This program does not speak the protocol of the release.
     #[error(
-        "the release speaks protocol {release}, this program {} to {}: update this program first",
-        version::MIN,
-        version::CURRENT
+        "the release speaks protocol version {release}, this program {}: update this program first",
+        version::Spoken
     )]
     NewerProtocol {
         /// Newest protocol version of the release.

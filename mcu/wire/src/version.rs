@@ -36,3 +36,35 @@ pub const CURRENT: u16 = 1;
 pub const fn speaks(version: u16) -> bool {
     MIN <= version && version <= CURRENT
 }
+
+/// The versions that this crate speaks, in words: `version 1`, or `versions 1 to 3`.
+#[derive(Debug, Clone, Copy)]
+pub struct Spoken;
+
+impl core::fmt::Display for Spoken {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        in_words(MIN, CURRENT, f)
+    }
+}
+
+fn in_words(oldest: u16, newest: u16, f: &mut impl core::fmt::Write) -> core::fmt::Result {
+    match oldest == newest {
+        true => write!(f, "version {newest}"),
+        false => write!(f, "versions {oldest} to {newest}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::{String, ToString};
+
+    #[test]
+    fn the_versions_are_told_in_words() {
+        let (mut one, mut three) = (String::new(), String::new());
+        in_words(1, 1, &mut one).unwrap();
+        in_words(1, 3, &mut three).unwrap();
+        assert_eq!((&one[..], &three[..]), ("version 1", "versions 1 to 3"));
+        assert!(Spoken.to_string().ends_with(&CURRENT.to_string()));
+    }
+}

@@ -73,7 +73,7 @@ fn a_camera_of_a_future_protocol_is_told_apart_with_both_versions() {
             capabilities: Capabilities::default(),
         }))
     };
-    let words = ["protocol version 99", "versions 1 to 4", "update this program"];
+    let words = ["protocol version 99", "this program version 1:", "update this program"];
     refused(&answering(identity), &words);
     refused(&answering(|| Err(Refusal::Protocol { device: 99 })), &words);
 }
@@ -86,13 +86,13 @@ fn a_greeting_that_says_more_than_ours_still_names_its_version() {
     };
     refused(
         &replying(greeting),
-        &["protocol version 99", "versions 1 to 4", "update this program"],
+        &["protocol version 99", "this program version 1:", "update this program"],
     );
 }
 
 #[test]
 fn a_camera_of_the_past_is_to_be_updated() {
-    let words = ["protocol version 0", "versions 1 to 4", "update the camera's firmware"];
+    let words = ["protocol version 0", "this program version 1:", "update the camera's firmware"];
     refused(&answering(|| Err(Refusal::Protocol { device: 0 })), &words);
 }
 
