@@ -20,6 +20,7 @@ sys.dont_write_bytecode = True
 import by_hand
 import check
 import links
+import people
 
 PAGE = pathlib.Path(__file__).parents[3] / "src/serve/page"
 # A part that passes takes less on a busy machine.
@@ -245,8 +246,8 @@ class Faulty:
         page.route(re.compile(r"^http://[^/]+/$"), self.serve)
         return page
 
-    def new_context(self):
-        return Faulty(self.browser.new_context(), self.file, self.content)
+    def new_context(self, **options):
+        return Faulty(self.browser.new_context(**options), self.file, self.content)
 
     def close(self):
         self.browser.close()
@@ -266,7 +267,7 @@ def leds(browser, address):
     page.close()
 
 
-PARTS = {part.__name__: part for part in [*by_hand.PARTS, *links.PARTS, leds, check.fault]}
+PARTS = {part.__name__: part for part in [*by_hand.PARTS, *links.PARTS, *people.PARTS, leds, check.fault]}
 
 
 def seen(browser, address, part):
