@@ -514,7 +514,7 @@ def controls(browser, address):
     page.locator("#sampling").press("Enter")
     told.sends(("settings", {"sampling": 0.77}))
     # What is refused is said until something is accepted.
-    told.answer = {"status": 400, "body": "sweeps is 9, expected less"}
+    told.answer = {"status": 400, "content_type": "text/plain", "body": "sweeps is 9, expected less"}
     enters("sweeps", "9", ("settings", {"sweeps": 9}))
     told.will_have("notes", "sweeps is 9, expected less; update the firmware")
     told.answer = {"json": {}}
