@@ -21,7 +21,7 @@ EVERY_S = 5
 
 
 def screens(browser, address):
-    """Image, LEDs, stop, start and method are on the screen together, at the top of the page and without scrolling."""
+    """Image, LEDs, stop, start and method are on the screen together, without scrolling; on a laptop the settings, too."""
     for width, height in SCREENS:
         page = browser.new_page(viewport={"width": width, "height": height})
         page.goto(address)
@@ -29,6 +29,9 @@ def screens(browser, address):
         seen(page, "enhanced", 64)
         expect(page.locator("#leds")).to_have_text("LEDs on")
         together = ["image", "leds", "stop", "methods"]
+        # On a laptop all settings are beside the images.
+        if width > 1000:
+            together += ["enhanced", "strength", "frames", "order", "sampling", "sweeps", "colours", "range"]
         for words, more in [("LEDs on", []), ("LEDs off, stopped", ["start"])]:
             if more:
                 page.keyboard.press("Escape")
@@ -211,12 +214,18 @@ def speech(browser, address):
     """A page that changes ten times a second says each part once in 5 s at most, and when it has changed; keys are answered."""
     told = Told(browser, address)
     page = told.page
-    told.page.wait_for_timeout(1000 * EVERY_S)
     assert page.evaluate(HEAR) > 3
-    # Nothing new is nothing to say, whatever the numbers do.
-    for at in range(20):
-        told.tell(frames={"received": 20000 + at}, picture={"reconstruct_ms": at}, images={"shown": 200 + at})
-    assert page.evaluate("heard") == [], page.evaluate("heard")
+    # Nothing new is nothing to say, whatever the numbers do. On a busy machine the page may have missed a message before.
+    for _ in range(4):
+        page.evaluate("heard.length = 0")
+        for at in range(20):
+            told.tell(frames={"received": 20000 + at}, picture={"reconstruct_ms": at}, images={"shown": 200 + at})
+            page.wait_for_timeout(250)
+        heard = page.evaluate("heard")
+        if not heard:
+            break
+    else:
+        raise AssertionError(f"says what is not new: {heard}")
     for at in range(120):
         told.tell(
             camera={"line": f"line {at}", "leds": ["on", "off", "unknown"][at % 3], "leds_age_ms": 100 * at},
@@ -283,6 +292,7 @@ def scene(browser, address):
     page.mouse.down()
     page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 0.5 * box["height"], steps=4)
     drawn = levels(page, "drawing")
+    assert all(drawn[32 * 64 + at] == 255 for at in range(16, 48)), "the stroke is not on the canvas"
     page.wait_for_timeout(1500)
     assert levels(page, "drawing") == drawn, "a stroke under way is drawn over"
     page.mouse.up()
