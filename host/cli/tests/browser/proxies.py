@@ -135,7 +135,8 @@ def behind(browser, program, name, configure):
                 page.on("pageerror", lambda error: problems.append(str(error)))
                 page.on("response", lambda answer: problems.append(f"{answer.status} {answer.url}") if answer.status >= 400 else None)
                 # Without its token the page is refused; with it, the address loses its token and gets its last '/'.
-                assert page.goto(f"{place}/").status == 401
+                refused = page.goto(f"{place}/").status
+                assert refused == 401, f"without its token: {refused}, expected 401"
                 page.goto("about:blank")
                 problems.clear()
                 page.goto(f"{place}?token={token}")

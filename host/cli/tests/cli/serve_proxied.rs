@@ -2,6 +2,7 @@
 
 use crate::bench::Bench;
 use crate::serve::{Server, serve};
+use std::io::{BufRead, BufReader, Write};
 
 const TOKEN: &str = "a-token-for-the-tests";
 
@@ -77,9 +78,16 @@ fn a_name_that_is_allowed_demands_a_token_and_may_come_by_https() {
     let own = [format!("Host: {}", server.address), format!("Origin: https://{}", server.address)];
     assert_eq!(ask("POST", &[&own[0], &own[1]]), 403);
     // A proxy hands each state on at once.
-    let path = "/lab/camera1/api/next";
-    let next = server.ask("GET", path, &[&header], "").head.to_lowercase();
-    assert!(next.contains("x-accel-buffering: no"), "{next}");
+    for path in ["/api/next", "/events"] {
+        let mut stream = server.connect();
+        let host = &server.address;
+        write!(stream, "GET /lab/camera1{path} HTTP/1.1\r\nHost: {host}\r\n{header}\r\n\r\n")
+            .unwrap();
+        let lines = BufReader::new(stream).lines().map(Result::unwrap);
+        let head: Vec<String> = lines.take_while(|line| !line.is_empty()).collect();
+        let is_told = head.iter().any(|line| line.eq_ignore_ascii_case("x-accel-buffering: no"));
+        assert!(is_told, "{path}: {head:?}");
+    }
 
     // Without a token of the user's, a name makes one.
     let named = serve(&bench, &["--allow-host", "cam.lab"]);
