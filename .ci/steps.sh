@@ -18,7 +18,7 @@ steps=(
     "demo            the README's demo command, every command line of the pages, and the program's other long tests"
     "examples        examples of the libraries"
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
-    "page            the live page in a browser; Debian's Chromium, demo"
+    "page            the live page in a browser, also behind nginx and Caddy; Debian's Chromium, nginx and caddy, demo"
     "web             the camera in a browser: its numbers beside native ones; Debian's Chromium, rustup's target, demo"
     "tcp             two processes over TCP, and boards/hil.sh; demo"
     "recordings      other programs read recordings and exported files; demo, PyPI"
@@ -365,7 +365,11 @@ in_browser() {
     fi
 }
 
-step_page() { in_browser check.py; }
+step_page() {
+    # The packages' own services stay off: the check runs both programs as docs/live-page.md has them.
+    RUNLEVEL=1 debian nginx caddy openssl || echo "no nginx and no caddy installed here"
+    PATH=$PATH:/usr/sbin in_browser check.py
+}
 
 # After the book, which would remove the page.
 step_web() {

@@ -11,7 +11,10 @@ use nirspi::exposure::Light;
 use nirspi::files::{interrupt, read_small_text};
 use nirspi::link::CameraAddress;
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
-use nirspi::serve::{CameraSource, Connect, Connected, Imaging, Server, StagedScene, Token, serve};
+use nirspi::serve::{
+    Access, BasePath, CameraSource, Connect, Connected, HostName, Imaging, Server, StagedScene,
+    Token, serve,
+};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::MemoryLink;
@@ -48,6 +51,13 @@ pub struct Args {
     /// if its mode forbids that
     #[arg(long, value_name = "FILE", conflicts_with = "token")]
     token_file: Option<PathBuf>,
+    /// Serve everything below this path, as /camera1: for a reverse proxy that has more than this page
+    #[arg(long, value_name = "PATH", default_value = "/")]
+    base_path: BasePath,
+    /// Name under which a reverse proxy or other machines open the page, as camera.example.org. It demands a token. Give the
+    /// option again for another name [default: localhost and the addresses of this machine]
+    #[arg(long, value_name = "NAME")]
+    allow_host: Vec<HostName>,
     /// Folder for recordings, which the page begins and ends. Without it, the page cannot record
     #[arg(long, value_name = "DIR")]
     record_to: Option<PathBuf>,
@@ -108,7 +118,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(folder) = args.record_to.as_ref().filter(|folder| !folder.is_dir()) {
         bail!("--record-to {}: found no such folder", folder.display());
     }
-    let server = Server::bind(&args.listen, args.token()?, made())
+    let access = Access {
+        token: args.token()?,
+        names: args.allow_host.clone(),
+        base_path: args.base_path.clone(),
+    };
+    let server = Server::bind(&args.listen, access, made())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let imaging =
         Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(args)?)?;

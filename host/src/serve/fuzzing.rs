@@ -8,7 +8,7 @@ use super::imaging::Picture;
 use super::settings::{Measuring, Offer, Settings};
 use super::stage::{Stage, StagedScene};
 use super::state::Published;
-use super::{Server, Shared, Token, http, lock};
+use super::{Access, Server, Shared, Token, http, lock};
 use crate::scene::SceneSource;
 use crate::session::CameraIdentity;
 use crate::setup::MeasurementSetup;
@@ -93,7 +93,10 @@ impl Still {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.expect("a runtime");
         let made = crate::provenance::Made::by("fuzzing", None, ["fuzzing"], 0);
-        let bind = |token| Server::bind("127.0.0.1:0", token, &made).expect("a port");
+        let bind = |token| {
+            let access = Access { token, ..Access::default() };
+            Server::bind("127.0.0.1:0", access, &made).expect("a port")
+        };
         let open = bind(None);
         let guarded = bind(Some(TOKEN.parse::<Token>().expect("a token")));
         let places = [open.address, guarded.address];

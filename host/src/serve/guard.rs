@@ -9,6 +9,7 @@
 //! (`tests::our_own_pages_and_scripts_pass`, `tests::foreign_names_are_refused`,
 //! `tests::foreign_pages_are_refused`). The check comes before any other use of the request.
 
+use super::access::HostName;
 use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
 use std::net::{IpAddr, SocketAddr};
@@ -19,25 +20,37 @@ use thiserror::Error;
 pub enum Refused {
     /// The requested host name is not this server's.
     #[error(
-        "this server does not go by that name: open it by its IP address, or as localhost on its own machine"
+        "this server does not go by that name: open it by its IP address, or as localhost on its own machine, or start it \
+         with --allow-host NAME"
     )]
     Host,
     /// A page of another site sent the request.
-    #[error("a page of another site asked: open this server's own")]
+    #[error(
+        "a page of another site asked: open this server's own page; a proxy must pass the header Host on as it comes"
+    )]
     Origin,
 }
 
-/// Accepts a request or returns the reason for refusing. `listen` is where this server listens.
+/// Accepts a request or returns the reason for refusing. `listen` is where this server listens, `names` are its further
+/// names. A page that was opened by one of these names may come by `https`, which a proxy before the server adds.
 ///
 /// The port in `Host` is not checked. The port differs if a user forwards the server's port (ssh
 /// -L), and a page of another site cannot choose the port.
 ///
 /// # Errors
 /// [`Refused`].
-pub fn check(method: &Method, headers: &HeaderMap, listen: SocketAddr) -> Result<(), Refused> {
-    let host = our_host(headers, listen)?;
+pub fn check(
+    method: &Method,
+    headers: &HeaderMap,
+    listen: SocketAddr,
+    names: &[HostName],
+) -> Result<(), Refused> {
+    let (host, by_name) = our_host(headers, listen, names)?;
     if headers.contains_key(header::ORIGIN) {
-        let origin = only(headers, &header::ORIGIN).and_then(|o| o.strip_prefix("http://"));
+        let origin = only(headers, &header::ORIGIN).and_then(|origin| {
+            let secure = origin.strip_prefix("https://").filter(|_| by_name);
+            secure.or_else(|| origin.strip_prefix("http://"))
+        });
         if !origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
             return Err(Refused::Origin);
         }
@@ -52,11 +65,20 @@ pub fn check(method: &Method, headers: &HeaderMap, listen: SocketAddr) -> Result
     Ok(())
 }
 
-/// The host name of a request, if it is this server's.
-fn our_host(headers: &HeaderMap, listen: SocketAddr) -> Result<&str, Refused> {
+/// Host and port of a request, if they are this server's, and whether its host is one of `names`.
+fn our_host<'h>(
+    headers: &'h HeaderMap,
+    listen: SocketAddr,
+    names: &[HostName],
+) -> Result<(&'h str, bool), Refused> {
     let host = only(headers, &header::HOST).ok_or(Refused::Host)?;
     let authority: Authority = host.parse().map_err(|_| Refused::Host)?;
-    if is_ours(authority.host(), listen) { Ok(host) } else { Err(Refused::Host) }
+    let by_name = names.iter().any(|name| name.is(authority.host()));
+    if by_name || is_ours(authority.host(), listen) {
+        Ok((host, by_name))
+    } else {
+        Err(Refused::Host)
+    }
 }
 
 /// The value of a header that occurs once.
@@ -66,7 +88,7 @@ fn only<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     if all.next().is_some() { None } else { first.to_str().ok() }
 }
 
-/// Whether an address may be this server's. `localhost` is the only accepted name, because DNS
+/// Whether an address may be this server's. `localhost` is the only name that is accepted unasked, because DNS
 /// rebinding needs a name.
 fn is_ours(host: &str, listen: SocketAddr) -> bool {
     is_this_machine(host)
@@ -96,7 +118,8 @@ mod tests {
         for &(name, value) in headers {
             map.append(HeaderName::from_static(name), value.parse().unwrap());
         }
-        check(&method, &map, listen.parse().unwrap())
+        let names = ["cam.lab", "192.0.2.9"].map(|name| name.parse().unwrap());
+        check(&method, &map, listen.parse().unwrap(), &names)
     }
 
     #[test]
@@ -117,6 +140,33 @@ mod tests {
         assert_eq!(asked("192.168.1.7:80", &[("host", "192.168.1.7")]), Ok(()));
         let link = [("sec-fetch-site", "cross-site"), ("sec-fetch-mode", "navigate")];
         assert_eq!(asked("[::1]:80", &[&[("host", "localhost")], &link[..]].concat()), Ok(()));
+    }
+
+    #[test]
+    fn pages_of_a_name_that_is_allowed_pass_with_http_and_https() {
+        for (host, origin) in [
+            ("cam.lab", "https://cam.lab"),
+            ("CAM.lab:8443", "https://cam.lab:8443"),
+            ("cam.lab:81", "http://cam.lab:81"),
+            ("192.0.2.9", "https://192.0.2.9"),
+        ] {
+            let headers = [("host", host), ("origin", origin), ("sec-fetch-site", "same-origin")];
+            assert_eq!(asked("127.0.0.1:8080", &headers), Ok(()), "{host}");
+        }
+        for (host, origin) in [
+            ("cam.lab", "https://cam.lab:8443"),
+            ("cam.lab", "https://other.lab"),
+            ("cam.lab", "ftp://cam.lab"),
+            ("cam.lab", "https://http://cam.lab"),
+            ("cam.lab:8080", "https://cam.lab"),
+            ("127.0.0.1:8080", "https://cam.lab"),
+        ] {
+            let asked = asked("127.0.0.1:8080", &[("host", host), ("origin", origin)]);
+            assert_eq!(asked, Err(Refused::Origin), "{host}, {origin}");
+        }
+        for host in ["xcam.lab", "cam.lab.example", "lab", "192.0.2.8"] {
+            assert_eq!(asked("127.0.0.1:8080", &[("host", host)]), Err(Refused::Host), "{host}");
+        }
     }
 
     #[test]

@@ -6,13 +6,14 @@
 //! (`a_browser_that_does_not_read_delays_no_other_and_then_sees_the_newest` and
 //! `a_slow_browser_has_few_old_images_before_it` in `host/src/serve/tests.rs`).
 
+use super::access::Access;
 use super::change_rate::PER_SECOND;
 use super::connections::{Connections, Door, Peer, Streaming};
 use super::delays::Passed;
 use super::imaging::Picture;
 use super::server::Server;
 use super::state::Published;
-use super::token::{self, Token};
+use super::token;
 use super::{Shared, commands, guard, lock, page};
 use crate::causes::printable;
 use crate::files::image::encode_grey;
@@ -53,6 +54,8 @@ const AGE: HeaderName = HeaderName::from_static("state-age-ms");
 const SCENE: &str = "/api/scene";
 /// The path of messages that switch the light off.
 const STOP: &str = "/api/stop";
+/// Tells a reverse proxy (nginx) to hand each state on at once. Else it would keep old states for a slow browser.
+const UNBUFFERED: (HeaderName, &str) = (HeaderName::from_static("x-accel-buffering"), "no");
 
 /// Security headers for every response: no external content, no framing, no caching.
 const HEADERS: [(HeaderName, &str); 5] = [
@@ -73,7 +76,7 @@ struct App {
     shared: Arc<Shared>,
     published: watch::Receiver<Arc<Published>>,
     listen: SocketAddr,
-    token: Option<Token>,
+    access: Access,
     made: Made,
 }
 
@@ -106,30 +109,41 @@ pub(super) fn begin(
     shared: Arc<Shared>,
     published: watch::Receiver<Arc<Published>>,
 ) -> io::Result<JoinHandle<io::Result<()>>> {
-    let Server { listener, token, made, address: listen } = server;
+    let Server { listener, access, made, address: listen } = server;
     listener.set_nonblocking(true)?;
     let listener = tokio::net::TcpListener::from_std(listener)?;
     let door = Door::new(listener, Connections::default());
-    let router = routes(App { shared, published, listen, token, made });
+    let router = routes(App { shared, published, listen, access, made });
     let service = router.into_make_service_with_connect_info::<Peer>();
     Ok(tokio::spawn(async move { serve(door, service).await }))
 }
 
-/// The page and its interface for scripts.
+/// The page and its interface for scripts, all below the base path.
 fn routes(app: App) -> Router {
-    Router::new()
-        .merge(page::routes())
-        .route("/events", get(events))
-        .route("/api/next", get(next_state))
-        .route("/api/state", get(state))
-        .route("/api/settings", post(settings))
-        .route(STOP, post(stop))
-        .route("/api/start", post(start))
-        .route(SCENE, post(scene).layer(DefaultBodyLimit::max(MAX_SCENE_BYTES)))
-        .route("/image.png", get(image))
-        .route("/enhanced.png", get(enhanced))
-        .route("/image.npy", get(image_numbers))
-        .route("/enhanced.npy", get(enhanced_numbers))
+    let base = app.access.base_path.clone();
+    let answers = [
+        ("/events", get(events)),
+        ("/api/next", get(next_state)),
+        ("/api/state", get(state)),
+        ("/api/settings", post(settings)),
+        (STOP, post(stop)),
+        ("/api/start", post(start)),
+        (SCENE, post(scene).layer(DefaultBodyLimit::max(MAX_SCENE_BYTES))),
+        ("/image.png", get(image)),
+        ("/enhanced.png", get(enhanced)),
+        ("/image.npy", get(image_numbers)),
+        ("/enhanced.npy", get(enhanced_numbers)),
+    ];
+    let router = answers
+        .into_iter()
+        .chain(page::routes())
+        .fold(Router::new(), |router, (path, answer)| router.route(&base.before(path), answer));
+    // The page's own addresses count from its last '/'.
+    let router = match base.named() {
+        Some(path) => router.route(path, get(to_the_page)),
+        None => router,
+    };
+    router
         .fallback(nothing_there)
         .layer(DefaultBodyLimit::max(MAX_CHANGE_BYTES))
         .layer(from_fn_with_state(app.clone(), only_ours))
@@ -152,10 +166,12 @@ async fn only_ours(State(app): State<App>, request: Request, next: Next) -> Resp
 /// The answer to a request that no handler may see.
 fn refused(app: &App, request: &Request) -> Option<Response> {
     let (headers, uri) = (request.headers(), request.uri());
-    if let Err(refused) = guard::check(request.method(), headers, app.listen) {
+    let Access { token, names, base_path: base } = &app.access;
+    if let Err(refused) = guard::check(request.method(), headers, app.listen, names) {
         return Some(line(StatusCode::FORBIDDEN, &refused));
     }
-    if let Some(token) = &app.token {
+    let path = base.below(uri.path()).unwrap_or_default();
+    if let Some(token) = token {
         let port = app.listen.port();
         if !token.is_in(headers, uri, port) {
             let words =
@@ -163,12 +179,13 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
             return Some(line(StatusCode::UNAUTHORIZED, &words));
         }
         // The browser keeps the token as a cookie, and the address without the token.
-        if request.method() == Method::GET && uri.path() == "/" && token::in_query(uri).is_some() {
-            let cookie = [(header::SET_COOKIE, token.cookie(port))];
-            return Some((cookie, Redirect::to("./")).into_response());
+        let is_page = path == "/" || base.named() == Some(uri.path());
+        if request.method() == Method::GET && is_page && token::in_query(uri).is_some() {
+            let cookie = [(header::SET_COOKIE, token.cookie(port, base))];
+            return Some((cookie, Redirect::to(&base.relative(uri.path()))).into_response());
         }
     }
-    let most = if uri.path() == SCENE { MAX_SCENE_BYTES } else { MAX_CHANGE_BYTES };
+    let most = if path == SCENE { MAX_SCENE_BYTES } else { MAX_CHANGE_BYTES };
     let announced = headers.get(header::CONTENT_LENGTH).map(|value| value.to_str().map(str::parse));
     let fits = match announced {
         None => true,
@@ -178,7 +195,7 @@ fn refused(app: &App, request: &Request) -> Option<Response> {
         let words = format!("the request has too long a body, expected at most {most} bytes");
         return Some(line(StatusCode::PAYLOAD_TOO_LARGE, &words));
     }
-    let changes = request.method() == Method::POST && uri.path() != STOP;
+    let changes = request.method() == Method::POST && path != STOP;
     let peer = request.extensions().get::<ConnectInfo<Peer>>();
     if changes && !peer.is_some_and(|ConnectInfo(peer)| peer.may_change()) {
         let words = format!(
@@ -194,10 +211,18 @@ fn line(status: StatusCode, text: &impl ToString) -> Response {
     (status, format!("{}\n", printable(&text.to_string()))).into_response()
 }
 
-async fn nothing_there() -> Response {
-    let there = "nothing there, expected /, /events, /api/state, /api/next, /api/settings, /api/scene, /api/stop, \
+async fn to_the_page(State(app): State<App>, uri: Uri) -> Redirect {
+    Redirect::to(&app.access.base_path.relative(uri.path()))
+}
+
+async fn nothing_there(State(app): State<App>) -> Response {
+    let place = match app.access.base_path.named() {
+        Some(path) => format!("nothing there: everything is below {path}, there"),
+        None => "nothing there,".to_owned(),
+    };
+    let there = "expected /, /events, /api/state, /api/next, /api/settings, /api/scene, /api/stop, \
                  /api/start, /image.png, /enhanced.png, /image.npy or /enhanced.npy";
-    line(StatusCode::NOT_FOUND, &there)
+    line(StatusCode::NOT_FOUND, &format!("{place} {there}"))
 }
 
 fn json(text: String) -> Response {
@@ -236,7 +261,7 @@ async fn next_state(State(app): State<App>, uri: Uri) -> Response {
         }
     }
     let age = [(AGE, made.elapsed().as_millis().to_string())];
-    (age, json(moment.message.clone())).into_response()
+    (age, [UNBUFFERED], json(moment.message.clone())).into_response()
 }
 
 async fn image(State(app): State<App>) -> Response {
@@ -333,7 +358,8 @@ async fn events(State(app): State<App>, ConnectInfo(peer): ConnectInfo<Peer>) ->
         let words = "too many pages are open: close one, then open this one again";
         return line(StatusCode::SERVICE_UNAVAILABLE, &words);
     };
-    Sse::new(states(app.published, Viewer::new(app.shared, streaming))).into_response()
+    ([UNBUFFERED], Sse::new(states(app.published, Viewer::new(app.shared, streaming))))
+        .into_response()
 }
 
 /// The states for one page, each after the system has taken the one before for sending.

@@ -402,7 +402,7 @@ impl Told {
             overload: lock(&shared.overload).state(),
             events: log.events(),
         };
-        Published::new(&state, self.picture.as_ref())
+        Published::new(&state, self.picture.as_ref(), shared.stage.drawing().as_deref())
     }
 }
 

@@ -16,6 +16,8 @@
 //! delay to each stage is measured (`delays.rs`). If the computer is too slow for the camera, the page
 //! gives up images, then enhancement (`overload.rs`).
 
+#[cfg(feature = "serve")]
+mod access;
 mod begin;
 mod camera;
 mod camera_log;
@@ -56,6 +58,8 @@ mod threads;
 mod token;
 mod turns;
 
+#[cfg(feature = "serve")]
+pub use access::{Access, BasePath, BasePathError, HostName, HostNameError};
 pub use begin::TurnsError;
 pub use camera::{CameraSource, Connect, Connected};
 pub use imaging::{Imaging, ImagingError};

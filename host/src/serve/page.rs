@@ -1,16 +1,15 @@
 //! The files of the page, which are part of the program.
 
-use axum::Router;
 use axum::http::header;
 use axum::response::{Html, IntoResponse, Response};
-use axum::routing::get;
+use axum::routing::{MethodRouter, get};
 
 const INDEX: &str = include_str!("page/index.html");
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Path, type and content of each file that the page loads.
-const FILES: [(&str, &str, &str); 19] = [
+const FILES: [(&str, &str, &str); 21] = [
     ("/page/style.css", STYLE, include_str!("page/style.css")),
     ("/page/main.js", SCRIPT, include_str!("page/main.js")),
     ("/page/connection.js", SCRIPT, include_str!("page/connection.js")),
@@ -19,6 +18,8 @@ const FILES: [(&str, &str, &str); 19] = [
     ("/page/windows.js", SCRIPT, include_str!("page/windows.js")),
     ("/page/words.js", SCRIPT, include_str!("page/words.js")),
     ("/page/dom.js", SCRIPT, include_str!("page/dom.js")),
+    ("/page/explain.js", SCRIPT, include_str!("page/explain.js")),
+    ("/page/speech.js", SCRIPT, include_str!("page/speech.js")),
     ("/page/light.js", SCRIPT, include_str!("page/light.js")),
     ("/page/display.js", SCRIPT, include_str!("page/display.js")),
     ("/page/controls.js", SCRIPT, include_str!("page/controls.js")),
@@ -32,12 +33,13 @@ const FILES: [(&str, &str, &str); 19] = [
     ("/page/line.js", SCRIPT, include_str!("page/line.js")),
 ];
 
-/// The routes of all files.
-pub fn routes<S: Clone + Send + Sync + 'static>() -> Router<S> {
-    let index = Router::new().route("/", get(Html(INDEX)));
-    FILES.iter().fold(index, |router, &(path, kind, content)| {
-        router.route(path, get(move || async move { file(kind, content) }))
-    })
+/// Path and answer of every file.
+pub fn routes<S: Clone + Send + Sync + 'static>()
+-> impl Iterator<Item = (&'static str, MethodRouter<S>)> {
+    let files = FILES
+        .iter()
+        .map(|&(path, kind, content)| (path, get(move || async move { file(kind, content) })));
+    [("/", get(Html(INDEX)))].into_iter().chain(files)
 }
 
 fn file(kind: &'static str, content: &'static str) -> Response {

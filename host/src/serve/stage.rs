@@ -5,6 +5,7 @@
 //! (`tests::a_page_names_no_file`).
 
 use super::lock;
+use crate::files::image::Grey;
 use crate::scene::{SceneError, SceneMap, SceneSource};
 use data_encoding::BASE64;
 use nirspi_optics::rain::Air;
@@ -14,6 +15,8 @@ use thiserror::Error;
 
 /// Edge in pixels of a letter, word or sheet.
 const DRAWN_PX: usize = 256;
+/// Edge in pixels of the drawing that a page shows.
+const SHOWN_PX: u32 = 64;
 /// Edges in pixels that a page's drawing can have.
 const DRAWING_PX: std::ops::RangeInclusive<usize> = 8..=128;
 /// Distances in metres that a page can ask for. The optics may refuse more.
@@ -167,6 +170,8 @@ pub struct SceneState {
     name: String,
     distance_m: f64,
     weather: String,
+    /// Whether another scene was asked for, and is not shown yet.
+    changing: bool,
     /// Why the scene that was asked for last is not shown.
     problem: Option<String>,
 }
@@ -175,7 +180,25 @@ pub struct SceneState {
 struct Scenes {
     wanted: Option<Arc<StagedScene>>,
     shown: Option<Arc<StagedScene>>,
+    /// The drawing of the scene that is shown.
+    drawing: Option<Arc<str>>,
     problem: Option<String>,
+}
+
+impl Scenes {
+    fn show(&mut self, scene: Option<Arc<StagedScene>>) {
+        self.drawing = scene.as_ref().map(|scene| drawing(&scene.map));
+        self.shown = scene;
+    }
+}
+
+/// A scene as a page shows it: (64, 64) 8-bit reflectances in base64, row by row.
+fn drawing(map: &SceneMap) -> Arc<str> {
+    let edge = u32::try_from(map.size_px).unwrap_or(u32::MAX);
+    let values = map.reflectance.clone();
+    let small = Grey { width: edge, height: edge, values }.resized(SHOWN_PX);
+    let levels: Vec<u8> = small.values.iter().map(|value| (255.0 * value).round() as u8).collect();
+    BASE64.encode(&levels).into()
 }
 
 /// The scene that is shown, and the scene that a page wants. Both are nothing for a real camera.
@@ -185,8 +208,9 @@ pub struct Stage(Mutex<Scenes>);
 impl Stage {
     /// A stage with this scene.
     pub fn of(scene: Option<StagedScene>) -> Self {
-        let shown = scene.map(Arc::new);
-        Self(Mutex::new(Scenes { wanted: shown.clone(), shown, problem: None }))
+        let mut scenes = Scenes { wanted: scene.map(Arc::new), ..Scenes::default() };
+        scenes.show(scenes.wanted.clone());
+        Self(Mutex::new(scenes))
     }
 
     /// Records the scene that a page wants.
@@ -214,7 +238,7 @@ impl Stage {
 
     /// Records that this scene is shown.
     pub fn show(&self, scene: Option<Arc<StagedScene>>) {
-        lock(&self.0).shown = scene;
+        lock(&self.0).show(scene);
     }
 
     /// Goes back from this scene, which cannot be shown, to the one before. Returns `false` if there
@@ -239,8 +263,14 @@ impl Stage {
             name: shown.map.name.clone(),
             distance_m: shown.distance_m,
             weather: shown.air.name().to_owned(),
+            changing: !same(scenes.wanted.as_ref(), Some(shown)),
             problem: scenes.problem.clone(),
         })
+    }
+
+    /// The drawing of the scene that is shown: (64, 64) 8-bit reflectances in base64; `None` for a real camera.
+    pub fn drawing(&self) -> Option<Arc<str>> {
+        lock(&self.0).drawing.clone()
     }
 }
 
@@ -291,18 +321,26 @@ mod tests {
         let levels = BASE64.encode(&[255; 64]);
         let drawing = serde_json::json!({ "scene": { "side": 8, "levels": levels } }).to_string();
         assert!(!stage.has_changed());
+        let drawn = || BASE64.decode(stage.drawing().unwrap().as_bytes()).unwrap();
+        let letter = drawn();
+        assert!(letter.len() == 64 * 64 && letter.contains(&255) && letter[0] == 0);
         stage.change(drawing.as_bytes()).unwrap();
         stage.change(br#"{"weather": "fog:5m", "distance_m": 0.5}"#).unwrap();
         let wanted = stage.wanted();
         assert!(stage.has_changed());
         assert_eq!(wanted.as_ref().unwrap().map.reflectance, [1.0; 64]);
+        // What is only asked for is not drawn.
+        assert!(drawn() == letter && stage.state().unwrap().changing);
         stage.show(wanted.clone());
+        assert_eq!(drawn(), [255; 64 * 64]);
         let state = stage.state().unwrap();
+        assert!(!state.changing);
         assert_eq!((state.name.as_str(), state.weather.as_str()), ("drawing", "fog:5m"));
 
         stage.change(br#"{"distance_m": 90}"#).unwrap();
         assert!(stage.refuse(stage.wanted().as_ref(), "too far"));
         assert!(!stage.has_changed() && stage.state().unwrap().problem.is_some());
+        assert!(!stage.state().unwrap().changing && drawn() == [255; 64 * 64]);
         assert!(!stage.refuse(stage.wanted().as_ref(), "nothing else is left"));
     }
 }

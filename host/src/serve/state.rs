@@ -151,6 +151,8 @@ struct Message<'s> {
     readings: Option<String>,
     /// (32, 32) distances in metres; `null` without a depth sensor.
     depth: Option<String>,
+    /// (64, 64) 8-bit reflectances of the scene that is shown, in base64; `null` for a real camera.
+    drawing: Option<&'s str>,
 }
 
 /// One state, encoded for sending.
@@ -177,7 +179,11 @@ impl Published {
     ///
     /// # Errors
     /// Does not occur: every field can be written as JSON.
-    pub fn new(state: &State<'_>, picture: Option<&Arc<Picture>>) -> serde_json::Result<Self> {
+    pub fn new(
+        state: &State<'_>,
+        picture: Option<&Arc<Picture>>,
+        drawing: Option<&str>,
+    ) -> serde_json::Result<Self> {
         let message = Message {
             state,
             image: picture.map(|picture| numbers(&picture.counts)),
@@ -185,6 +191,7 @@ impl Published {
             interval: picture.and_then(|picture| picture.half_width.as_deref().map(numbers)),
             readings: picture.map(|picture| numbers(&picture.readings)),
             depth: picture.and_then(|picture| Some(numbers(&picture.depth.as_ref()?.pixels_m))),
+            drawing,
         };
         Ok(Self {
             message: serde_json::to_string(&message)?,

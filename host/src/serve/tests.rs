@@ -313,9 +313,12 @@ impl Paper {
     fn new() -> Self {
         let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
         let (publish, published) = watch::channel(Arc::new(Published::default()));
-        let server =
-            Server::bind("127.0.0.1:0", None, &crate::provenance::tests::provenance().made)
-                .unwrap();
+        let server = Server::bind(
+            "127.0.0.1:0",
+            Access::default(),
+            &crate::provenance::tests::provenance().made,
+        )
+        .unwrap();
         let address = server.address;
         let serving = {
             let shared = Arc::clone(&shared);

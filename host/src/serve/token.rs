@@ -6,6 +6,7 @@
 //! (`a_client_in_the_network_gets_nothing_without_the_token` in
 //! `host/cli/tests/cli/serve_guarded.rs`). Tokens are compared in constant time.
 
+use super::access::BasePath;
 use axum::http::{HeaderMap, Uri, header};
 use data_encoding::BASE64URL_NOPAD;
 use std::fmt;
@@ -72,8 +73,10 @@ impl Token {
 
     /// The cookie by which a browser remembers the token until it is closed. Scripts cannot read
     /// it, and pages of other sites do not send it.
-    pub(super) fn cookie(&self, port: u16) -> String {
-        format!("{}={}; Path=/; HttpOnly; SameSite=Strict", cookie(port), self.0)
+    /// The browser sends it to `base`, with or without its last `/`, and to paths below.
+    pub(super) fn cookie(&self, port: u16, base: &BasePath) -> String {
+        let path = base.named().unwrap_or("/");
+        format!("{}={}; Path={path}; HttpOnly; SameSite=Strict", cookie(port), self.0)
     }
 }
 

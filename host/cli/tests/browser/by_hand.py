@@ -116,7 +116,7 @@ def message(given):
         "enhancement": {"model": "gan", "enhance_ms": 8.9, "depth": True, "blur_px": 1.23, "noise": 0.045, "inconsistency": 0.87},
     }
     state["problem"] = None
-    state["scene"] = {"name": "letter R", "distance_m": 0.3, "weather": "none", "problem": None}
+    state["scene"] = {"name": "letter R", "distance_m": 0.3, "weather": "none", "changing": False, "problem": None}
     state["line"] = {"damage": 0, "bytes": 123456, "flipped": 21, "dropped": 9}
     state["events"] = [{"unix_ms": 1000 * at, "level": "info", "text": f"event {at}"} for at in range(3)]
     return {
@@ -132,8 +132,8 @@ def message(given):
 class Told:
     """A page, the message that it is told next, and what it has sent."""
 
-    def __init__(self, browser, address):
-        self.page = browser.new_page(viewport={"width": 1200, "height": 960}, timezone_id="UTC")
+    def __init__(self, browser, address, **options):
+        self.page = browser.new_page(viewport={"width": 1200, "height": 960}, timezone_id="UTC", **options)
         given = json.loads(self.page.request.get(f"{address}/api/state").body())
         self.message = message(given)
         self.sent, self.answer, self.state_number = [], {"json": {}}, 0
@@ -514,7 +514,7 @@ def controls(browser, address):
     page.locator("#sampling").press("Enter")
     told.sends(("settings", {"sampling": 0.77}))
     # What is refused is said until something is accepted.
-    told.answer = {"status": 400, "body": "sweeps is 9, expected less"}
+    told.answer = {"status": 400, "content_type": "text/plain", "body": "sweeps is 9, expected less"}
     enters("sweeps", "9", ("settings", {"sweeps": 9}))
     told.will_have("notes", "sweeps is 9, expected less; update the firmware")
     told.answer = {"json": {}}

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The page of `nirspi serve` in a real browser: every control, the LEDs' switch, a fault, states told by hand, the token, a
-phone, the end.
+"""The page of `nirspi serve` in a real browser: every control, the LEDs' switch, a fault, states told by hand, bad links, people
+with their screens, keyboards and colours, proxies, the token, a phone, the end.
 
     python3 check.py target/release/nirspi [--screenshot docs/serve.png]
 
@@ -23,6 +23,8 @@ sys.dont_write_bytecode = True
 import by_hand
 import controls
 import links
+import people
+import proxies
 from pictures import LEVELS, fits, levels, seen
 
 # No wait takes longer, on a busy machine either.
@@ -199,7 +201,7 @@ def main():
     try:
         address = next(word for word in server.stdout.readline().split() if word.startswith("http://"))
         with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
+            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox", *proxies.BROWSER])
             page = browser.new_page(viewport={"width": 1200, "height": 960})
             page.set_default_timeout(LIMIT_MS)
             expect.set_options(timeout=LIMIT_MS)
@@ -220,9 +222,10 @@ def main():
             complaints = [said for said in complaints if "400 (Bad Request)" not in said]
             assert not complaints, complaints
             fault(browser, address)
-            for part in by_hand.PARTS + links.PARTS:
+            for part in by_hand.PARTS + links.PARTS + people.PARTS:
                 part(browser, address)
             token(browser, arguments.nirspi)
+            proxies.proxies(browser, arguments.nirspi)
             phone(browser, address)
             server.send_signal(signal.SIGTERM)
             expect(page.locator("#line")).to_contain_text("does not answer")

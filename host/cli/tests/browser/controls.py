@@ -152,7 +152,9 @@ def scene(page):
     expect(name).to_contain_text("letter A")
     page.locator("#white").click()
     expect(name).to_contain_text("white")
-    # A bar across the upper half.
+    # A bar across the upper half, on a canvas that shows the scene until it is cleared.
+    page.locator("#clear").click()
+    expect(name).to_contain_text("drawing")
     box = page.locator("#drawing").bounding_box()
     page.locator("#brush-size").fill("16")
     page.mouse.move(box["x"] + 0.1 * box["width"], box["y"] + 0.25 * box["height"])

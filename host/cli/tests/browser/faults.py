@@ -20,6 +20,7 @@ sys.dont_write_bytecode = True
 import by_hand
 import check
 import links
+import people
 
 PAGE = pathlib.Path(__file__).parents[3] / "src/serve/page"
 # A part that passes takes less on a busy machine.
@@ -121,8 +122,8 @@ FAULTS = [
     (
         "a page without a program offers to start",
         "light.js",
-        'text($("leds"), `LEDs unknown, ${age}: ${GONE.leds}`);\n  $("start").hidden = true;',
-        'text($("leds"), `LEDs unknown, ${age}: ${GONE.leds}`);',
+        'unknown(age, GONE.leds);\n  $("start").hidden = true;',
+        "unknown(age, GONE.leds);",
         "stream",
     ),
     (
@@ -229,6 +230,38 @@ FAULTS = [
         'className += bad ? "loss" : "";',
         "stream",
     ),
+    ("the method is below the images on a phone", "style.css", "#methods { gap", "#methods { order: 1; gap", "screens"),
+    ("settings are below the images on a laptop", "style.css", "(min-width: 60rem) {\n  .bench", "(min-width: 600rem) {\n  .bench", "screens"),
+    ("nothing shows what has the focus", "style.css", "outline: 3px solid var(--accent)", "outline: none", "keyboard"),
+    ("the header covers what has the focus", "style.css", "html { scroll-padding: 8rem 0 5rem; }", "", "keyboard"),
+    ("words are explained to a mouse alone", "dom.js", "element.tabIndex = meaning ? 0 : -1;", "", "keyboard"),
+    ("the focus explains nothing", "explain.js", "  explain(target);\n  if", "  if", "keyboard"),
+    ("a finger on a word explains nothing", "explain.js", 'pointerType !== "mouse"', 'pointerType === "mouse"', "keyboard"),
+    (
+        "with colours of the user's own the LEDs have no dot",
+        "style.css",
+        "#leds::before, #line::before { forced-color-adjust: none; }",
+        "",
+        "colours",
+    ),
+    (
+        "losses are told by their colour alone",
+        "style.css",
+        "#losses.loss { color: var(--bad); font-weight: 600; }",
+        "#losses.loss { color: var(--bad); }",
+        "colours",
+    ),
+    ("who asks for more contrast gets none", "style.css", "(prefers-contrast: more) { :root", "(prefers-contrast: less) { :root", "colours"),
+    ("a screen reader says each change", "speech.js", "part.timer = setTimeout(() => speak(part), EVERY_MS);", "", "speech"),
+    ("a screen reader says the age of the LEDs", "light.js", "`LEDs unknown: ${why}`", "`LEDs unknown, ${age}: ${why}`", "speech"),
+    ("warnings are not said", "facts.js", 'say("notes",', 'void ("notes",', "speech"),
+    ("a pixel is not said at its key", "display.js", "answer($(`${panel.id}-value`).textContent);", "", "speech"),
+    ("the drawing is not the scene", "scene.js", "draw(scene, drawing, moment);", "", "scene"),
+    ("a stroke is drawn over", "scene.js", " || last || sending || asked ||", " ||", "scene"),
+    ("a page without its script shows its controls", "index.html", "<main data-live hidden>", "<main data-live>", "dead"),
+    ("the stop button looks alive without its script", "index.html", '<button id="stop" disabled', '<button id="stop"', "dead"),
+    ("a page that loads goes on saying that it did not", "main.js", 'document.querySelectorAll(".dead")', "[]", "dead"),
+    ("a proxy's own page counts as a line of the program", "connection.js", '?.startsWith("text/plain")', "", "dead"),
 ]
 
 
@@ -245,8 +278,8 @@ class Faulty:
         page.route(re.compile(r"^http://[^/]+/$"), self.serve)
         return page
 
-    def new_context(self):
-        return Faulty(self.browser.new_context(), self.file, self.content)
+    def new_context(self, **options):
+        return Faulty(self.browser.new_context(**options), self.file, self.content)
 
     def close(self):
         self.browser.close()
@@ -266,7 +299,7 @@ def leds(browser, address):
     page.close()
 
 
-PARTS = {part.__name__: part for part in [*by_hand.PARTS, *links.PARTS, leds, check.fault]}
+PARTS = {part.__name__: part for part in [*by_hand.PARTS, *links.PARTS, *people.PARTS, leds, check.fault]}
 
 
 def seen(browser, address, part):

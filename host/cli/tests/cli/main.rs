@@ -43,6 +43,7 @@ mod serial;
 mod serve;
 mod serve_controls;
 mod serve_guarded;
+mod serve_proxied;
 mod settings;
 mod sparse_problems;
 mod update;

@@ -19,8 +19,12 @@ const pause = ms => new Promise(done => setTimeout(done, ms));
 // Sends a command. Returns whether the program has executed the command, and the text of the answer.
 export async function send(path, body, { signal, priority } = {}) {
   const got = await fetch(`.${path}`, { method: "POST", body, signal, priority, keepalive: priority === "high" });
-  return { ok: got.ok, text: await got.text() };
+  return { ok: got.ok, text: refusal(got, await got.text()) };
 }
+
+// The program refuses in one plain line. A proxy or another server has pages of its own.
+const refusal = (got, text) => got.ok || got.headers.get("Content-Type")?.startsWith("text/plain") ? text
+  : `HTTP status ${got.status}, and not from nirspi serve: a server between this page and nirspi serve has answered`;
 
 // Calls `show` with each message and the moment at which it was true at the latest, and `gone` with a line of text when no more come.
 export async function listen(show, gone) {
@@ -64,7 +68,7 @@ async function answer(address, abort) {
       parts.push(value);
     }
     const text = await new Blob(parts).text();
-    if (!got.ok) throw Object.assign(new Error(), { refusal: text.trim() });
+    if (!got.ok) throw Object.assign(new Error(), { refusal: refusal(got, text).trim() });
     return [JSON.parse(text), Number(got.headers.get("State-Age-Ms"))];
   } finally {
     clearTimeout(late);

@@ -1,10 +1,13 @@
 // The settings of the images, of the measurement and of recordings.
 
-import { $, frames, text } from "./dom.js";
+import { $, explained, frames, text } from "./dom.js";
 import { change, isTouched } from "./requests.js";
 import { MEANINGS } from "./words.js";
 
-for (const word of document.querySelectorAll("[data-word]")) word.title = MEANINGS[word.dataset.word] ?? "";
+// A label's own control has the focus for it.
+for (const word of document.querySelectorAll("[data-word]")) {
+  if (word.tagName === "LABEL") word.title = MEANINGS[word.dataset.word]; else explained(word, MEANINGS[word.dataset.word]);
+}
 
 function methods({ methods, about }) {
   const box = $("methods");
@@ -37,6 +40,11 @@ function put(id, value) {
   if (document.activeElement !== $(id)) $(id).value = value;
 }
 
+function sum(count) {
+  text($("frames-text"), frames(count));
+  $("frames").setAttribute("aria-valuetext", frames(count));
+}
+
 export function show({ settings, offered }) {
   methods(offered);
   options($("model"), offered.models);
@@ -55,7 +63,7 @@ export function show({ settings, offered }) {
   $("model").disabled = !settings.enhance;
   put("model", settings.model);
   put("frames", Math.round(Math.log2(settings.frames)));
-  text($("frames-text"), frames(settings.frames));
+  sum(settings.frames);
   put("order", settings.order);
   $("order").title = offered.orders.find(order => order.name === settings.order)?.about ?? "";
   put("sampling", +(100 * settings.sampling).toFixed(2));
@@ -77,6 +85,6 @@ $("sweeps").onchange = () => change({ sweeps: number("sweeps") });
 $("record").onclick = () => change({ record: $("record").getAttribute("aria-pressed") !== "true" });
 $("frames").oninput = () => {
   const wanted = 2 ** $("frames").value;
-  text($("frames-text"), frames(wanted));
+  sum(wanted);
   change({ frames: wanted });
 };

@@ -1,7 +1,8 @@
 // Draws the images: colour map, range, value under the cursor, warnings.
 
 import { gradient, table } from "./colours.js";
-import { $, fixed, frames, text } from "./dom.js";
+import { $, explained, fixed, frames, text } from "./dom.js";
+import { answer } from "./speech.js";
 
 export const rates = { drawn: 0 };
 let shown = null, lastShown = -1, drawn = 0, since = performance.now();
@@ -99,6 +100,7 @@ for (const panel of Object.values(PANELS)) {
     if (!step || !panel.cell) return;
     event.preventDefault();
     move(panel, panel.cell[0] + step[0], panel.cell[1] + step[1]);
+    answer($(`${panel.id}-value`).textContent);
   };
 }
 
@@ -130,7 +132,7 @@ export function show(message) {
   const found = picture?.enhancement;
   text($("about-image"), picture
     ? `${picture.method}${picture.past === null ? "" : ", recursive"}, ${frames(picture.frames)}, ${fixed(picture.reconstruct_ms, 1)} ms` : "");
-  $("about-image").title = picture?.past ?? "";
+  explained($("about-image"), picture?.past ?? "");
   text($("about-enhanced"), found
     ? `${found.model}, ${fixed(found.enhance_ms, 1)} ms${found.depth ? "" : ", no depth yet"}` : "");
   warn("doubt", picture?.short_warnings ?? []);

@@ -21,6 +21,13 @@ export function text(element, value) {
   if (element.textContent !== value) element.textContent = value;
 }
 
+// A text with an explanation, which the keyboard reaches.
+export function explained(element, meaning = "") {
+  if (element.title === meaning) return;
+  element.title = meaning;
+  element.tabIndex = meaning ? 0 : -1;
+}
+
 // Rows of a definition list: name, value, whether the value is bad news. Names of the glossary get its sentence.
 export function list(element, rows) {
   while (element.children.length > 2 * rows.length) element.lastChild.remove();
@@ -28,7 +35,7 @@ export function list(element, rows) {
     element.append(document.createElement(element.children.length % 2 ? "dd" : "dt"));
   rows.forEach(([name, value, bad], at) => {
     text(element.children[2 * at], name);
-    element.children[2 * at].title = MEANINGS[name] ?? "";
+    explained(element.children[2 * at], MEANINGS[name]);
     text(element.children[2 * at + 1], value);
     element.children[2 * at + 1].className = bad ? "loss" : "";
   });

@@ -3,6 +3,7 @@
 import { $, fixed, foreign, list, rate, text, whole } from "./dom.js";
 import * as account from "./account.js";
 import { answer } from "./requests.js";
+import { say } from "./speech.js";
 
 export function show(state, drawnPerSecond) {
   const { camera, run_frames: run, picture } = state, found = picture?.enhancement;
@@ -50,6 +51,7 @@ export function show(state, drawnPerSecond) {
   const advice = camera.versions.map(part => part.advice);
   const notes = [answer.refused, state.problem, ...(picture?.warnings ?? []), ...advice];
   text($("notes"), foreign(notes.filter(Boolean).map(note => note.trim()).join("; ")));
+  say("notes", [$("overload").textContent, $("notes").textContent].filter(Boolean).join("; "));
   events(state.events);
 }
 

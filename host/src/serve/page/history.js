@@ -28,7 +28,6 @@ function say() {
   const words = back === 0 ? "live"
     : `${back} image${back === 1 ? "" : "s"} back, ${((Date.now() - kept[kept.length - 1 - back].at) / 1000).toFixed(1)} s ago`;
   text($("scrub-text"), words);
-  $("scrub").setAttribute("aria-valuetext", words);
   document.body.dataset.view = back === 0 ? "live" : "earlier";
 }
 
@@ -40,6 +39,8 @@ export function showGone(age) {
 function look(wanted) {
   back = Math.max(0, Math.min(kept.length - 1, wanted));
   say();
+  // Said once, and not with each image that comes.
+  $("scrub").setAttribute("aria-valuetext", $("scrub-text").textContent);
   onLook.call();
 }
 $("scrub").oninput = () => look(kept.length - 1 - $("scrub").value);

@@ -3,6 +3,7 @@
 import { words as lastSeen } from "./age.js";
 import { GONE, send } from "./connection.js";
 import { $, foreign, text } from "./dom.js";
+import { say } from "./speech.js";
 import { hush, unhush } from "./windows.js";
 
 // A stop is sent again until the camera has confirmed that its LEDs are off. Only a person's start ends that.
@@ -46,18 +47,23 @@ export async function stop() {
 
 function alarm(mine) {
   if (mine !== stopping || mine.isDone) return;
-  text($("alarm"), ALARMS[mine.command === null ? "sent" : "arrived"]);
-  $("alarm").hidden = false;
+  warn(ALARMS[mine.command === null ? "sent" : "arrived"]);
+}
+
+function warn(words) {
+  text($("alarm"), words);
+  $("alarm").hidden = words === "";
+  say("alarm", words);
 }
 
 function finish(mine) {
   mine.isDone = true;
-  $("alarm").hidden = true;
+  warn("");
 }
 
 export async function start() {
   stopping = null;
-  $("alarm").hidden = true;
+  warn("");
   await command("/api/start");
 }
 
@@ -77,19 +83,17 @@ document.addEventListener("click", event => {
   if (event.detail > 0) event.target.closest?.("button, input[type=checkbox], input[type=radio]")?.blur();
 });
 $("stop").onclick = stop;
-// Until this program runs, the button could do nothing.
-$("stop").disabled = false;
 $("start").onclick = $("resume").onclick = $("try-again").onclick = start;
 
 export function show({ camera, light }) {
   const { leds, phase } = camera;
   document.body.dataset.leds = leds;
-  const words = {
-    on: light.allowed ? "LEDs on" : "stopping",
-    off: light.allowed ? "LEDs off" : "LEDs off, stopped",
-    unknown: `LEDs unknown, ${lastSeen(camera.leds_age_ms)}: no answer from the camera`,
-  };
-  text($("leds"), words[leds] ?? foreign(leds));
+  const isStopping = leds === "on" && !light.allowed, known = isStopping ? "stopping" : leds === "off" && !light.allowed
+    ? "LEDs off, stopped" : `LEDs ${foreign(leds)}`;
+  if (leds === "unknown") unknown(lastSeen(camera.leds_age_ms), "no answer from the camera");
+  else text($("leds"), known);
+  // What follows a stop is said at once: the LEDs are off, or the alarm.
+  if (leds !== "unknown" && !isStopping) say("leds", known);
   // A fault and a missing calibration have buttons of their own.
   $("start").hidden = light.allowed || phase === "fault" || phase === "uncalibrated";
   // A state from before the command confirms nothing.
@@ -97,9 +101,14 @@ export function show({ camera, light }) {
   if (isAfter && leds === "off" && !light.allowed) finish(stopping);
 }
 
+function unknown(age, why) {
+  text($("leds"), `LEDs unknown, ${age}: ${why}`);
+  say("leds", `LEDs unknown: ${why}`);
+}
+
 // There is no state of the last seconds.
 export function showGone(age) {
   document.body.dataset.leds = "unknown";
-  text($("leds"), `LEDs unknown, ${age}: ${GONE.leds}`);
+  unknown(age, GONE.leds);
   $("start").hidden = true;
 }

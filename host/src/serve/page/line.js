@@ -26,5 +26,6 @@ export function show({ line }) {
   $("shaking").hidden = !line;
   if (!line) return;
   text($("damage-text"), words(line.damage));
+  $("damage").setAttribute("aria-valuetext", words(line.damage));
   text($("line-bytes"), `${whole(line.bytes)} bytes passed, ${whole(line.flipped)} flipped, ${whole(line.dropped)} lost`);
 }

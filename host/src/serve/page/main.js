@@ -5,6 +5,7 @@ import { FRESH_MS, since, watch, words } from "./age.js";
 import { GONE, listen } from "./connection.js";
 import * as controls from "./controls.js";
 import * as display from "./display.js";
+import "./explain.js";
 import { $, foreign, text } from "./dom.js";
 import * as facts from "./facts.js";
 import * as light from "./light.js";
@@ -14,6 +15,7 @@ import * as plots from "./plots.js";
 import { onGone } from "./requests.js";
 import { download, npy, sheet } from "./save.js";
 import * as scene from "./scene.js";
+import { say } from "./speech.js";
 
 // The newest message, and the moment at which it was true. `why`: what is wrong with the connection.
 let newest = null, at = null, why = "";
@@ -30,7 +32,7 @@ function show(message, moment) {
   display.count(message);
   const { camera } = message.state;
   document.body.dataset.phase = camera.phase;
-  text($("line"), foreign(camera.line));
+  says(foreign(camera.line));
   text($("camera"), foreign(`${camera.identity.board} ${camera.identity.serial}`));
   document.title = `nirspi ${foreign(camera.identity.serial)}`;
   text($("wavelength"), String(camera.identity.wavelength_nm));
@@ -41,7 +43,7 @@ function show(message, moment) {
   showImages();
   facts.show(message.state, display.rates.drawn);
   controls.show(message.state);
-  scene.show(message.state);
+  scene.show(message, moment);
   line.show(message.state);
   plots.show(message.state);
   // An answer may come too late.
@@ -60,13 +62,18 @@ $("save-npy").onclick = () => {
   if (shown.enhanced) download(npy(display.values(shown.enhanced), 64), "enhanced.npy");
 };
 
+function says(words) {
+  text($("line"), words);
+  say("camera", words);
+}
+
 const age = () => at === null ? Infinity : since(at);
 
 // Says that what the page shows is old. A command that was answered is no state.
 function look() {
   if (!why && age() <= FRESH_MS) return;
   document.body.dataset.phase = "unserved";
-  text($("line"), foreign(why || GONE.line));
+  says(foreign(why || GONE.line));
   light.showGone(words(age()));
   facts.showGone();
   history.showGone(words(age()));
@@ -78,4 +85,8 @@ function gone(line = GONE.line) {
 onGone.call = gone;
 onReset.call = plots.forgetLosses;
 watch(() => { if (at !== null) look(); });
+// Every part of the script has loaded: what says that it did not goes, and the controls come.
+for (const words of document.querySelectorAll(".dead")) words.remove();
+for (const part of document.querySelectorAll("[data-live]")) part.hidden = false;
+$("stop").disabled = false;
 listen(show, gone);

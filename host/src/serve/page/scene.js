@@ -2,13 +2,17 @@
 
 import { $, foreign, text } from "./dom.js";
 import { post } from "./requests.js";
+import { answer, say } from "./speech.js";
 
 const SIDE = 64;
 const canvas = $("drawing"), pen = canvas.getContext("2d", { willReadFrequently: true });
 canvas.width = canvas.height = SIDE;
 let brush = [SIDE / 2, SIDE / 2], last = null, sending = 0;
+// The scene that is drawn, unless a person has drawn since; commands under way; when the last one was answered.
+let drawn = null, asked = 0, answered = -Infinity;
 
 function clear() {
+  drawn = null;
   pen.fillStyle = "#000";
   pen.fillRect(0, 0, SIDE, SIDE);
 }
@@ -22,17 +26,24 @@ function levels() {
 
 // Why the last picture could not be read.
 let unread = "";
-function apply(wish) {
+async function apply(wish) {
   unread = "";
-  return post("/api/scene", wish);
+  asked++;
+  await post("/api/scene", wish);
+  asked--;
+  answered = performance.now();
 }
-const drawing = () => apply({ scene: { side: SIDE, levels: levels() } });
+function drawing() {
+  sending = 0;
+  return apply({ scene: { side: SIDE, levels: levels() } });
+}
 function soon() {
   clearTimeout(sending);
   sending = setTimeout(drawing, 300);
 }
 
 function paint(from, to) {
+  drawn = null;
   const level = Math.round(255 * $("brush-level").value);
   pen.strokeStyle = `rgb(${level} ${level} ${level})`;
   pen.lineWidth = Number($("brush-size").value);
@@ -70,6 +81,7 @@ canvas.onkeydown = event => {
   if (step) brush = brush.map((was, axis) => Math.max(0, Math.min(SIDE - 1, was + 2 * step[axis])));
   if (!step || event.shiftKey) paint(from, brush);
   text($("drawing-says"), `brush at row ${brush[1]}, column ${brush[0]}`);
+  answer($("drawing-says").textContent);
 };
 
 $("clear").onclick = () => { clear(); soon(); };
@@ -97,11 +109,22 @@ $("picture").onchange = async () => {
   $("picture").value = "";
 };
 
-export function show({ scene }) {
+// Draws the scene that is before the camera, unless a person draws or has asked for another one.
+function draw(scene, levels, moment) {
+  if (!levels || levels === drawn || scene.changing || last || sending || asked || moment[0] < answered) return;
+  drawn = levels;
+  const pixels = new ImageData(SIDE, SIDE), bytes = atob(levels);
+  for (let at = 0; at < SIDE * SIDE; at++) pixels.data.set([...Array(3).fill(bytes.charCodeAt(at)), 255], 4 * at);
+  pen.putImageData(pixels, 0, 0);
+}
+
+export function show({ state: { scene }, drawing }, moment) {
   $("scene").hidden = !scene;
   if (!scene) return;
   text($("scene-name"), foreign(`${scene.name}, ${scene.distance_m} m, ${scene.weather}`));
   text($("scene-problem"), unread || foreign(scene.problem ?? ""));
+  say("scene", $("scene-problem").textContent);
+  draw(scene, drawing, moment);
   const isFree = id => document.activeElement !== $(id);
   if (isFree("distance")) $("distance").value = scene.distance_m;
   if (isFree("weather")) $("weather").value = scene.weather;
