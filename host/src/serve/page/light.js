@@ -1,6 +1,6 @@
 // The switch of the LEDs: always in reach, by button and by key.
 
-import { words as lastSeen } from "./age.js";
+import { FRESH_MS, words as lastSeen } from "./age.js";
 import { GONE, send } from "./connection.js";
 import { $, foreign, text } from "./dom.js";
 import { hush, unhush } from "./windows.js";
@@ -81,8 +81,12 @@ $("stop").onclick = stop;
 $("stop").disabled = false;
 $("start").onclick = $("resume").onclick = $("try-again").onclick = start;
 
+// How old the camera's word that its LEDs are off was in the newest state; null while the state says anything else.
+let offAge = null;
+
 export function show({ camera, light }) {
   const { leds, phase } = camera;
+  offAge = leds === "off" ? camera.leds_age_ms : null;
   document.body.dataset.leds = leds;
   const words = {
     on: light.allowed ? "LEDs on" : "stopping",
@@ -95,6 +99,13 @@ export function show({ camera, light }) {
   // A state from before the command confirms nothing.
   const isAfter = stopping?.command && light.commands >= stopping.command;
   if (isAfter && leds === "off" && !light.allowed) finish(stopping);
+}
+
+// The newest state is so old. The camera's word that the state brought is older, and other hosts may have the camera since.
+export function age(stateAge) {
+  if (offAge === null || offAge + stateAge <= FRESH_MS) return;
+  document.body.dataset.leds = "unknown";
+  text($("leds"), `LEDs unknown, ${lastSeen(offAge + stateAge)}: no answer from the camera`);
 }
 
 // There is no state of the last seconds.
