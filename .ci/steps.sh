@@ -432,7 +432,7 @@ step_tcp() {
 
 step_recordings() {
     cargo build --locked --release
-    python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6
+    python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 pillow
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
     target/recordings/bin/python host/cli/tests/recordings/check.py target/release/nirspi

@@ -402,7 +402,7 @@ def live(arguments):
     nirspi, led_log, seed, events = arguments
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
-        world = World(nirspi, led_log, seed, browser)
+        world, failed = World(nirspi, led_log, seed, browser), []
         try:
             world.begin()
             for count in itertools.count():
@@ -416,10 +416,13 @@ def live(arguments):
             for wish, words in [("stop", "LEDs off, stopped"), ("start", "LEDs on")]:
                 until(lambda: world.obeys(wish, words), f"{words} after all events", 60)
             world.look()
+        except Exception as error:
+            failed = [f"the world ended after {world.done.total()} events: {error!r}"]
         finally:
             world.close()
     broken, worst, near = judge(world.said, world.camera.edges)
-    passed = world.said[-1][0] - world.said[0][0]
+    broken += failed
+    passed = world.said[-1][0] - world.said[0][0] if world.said else 1
     shown = collections.Counter()
     for (now, _, says), (later, gap, _) in itertools.pairwise(world.said):
         shown["asleep" if gap > 1000 * ASLEEP_S else re.match(r"LEDs \w+|\w+", says)[0]] += (later - now) / passed
@@ -454,7 +457,7 @@ def main():
     for what in broken[:20]:
         print(what)
     if broken:
-        sys.exit(f"{len(broken)} looks at the page broke the law")
+        sys.exit(f"{len(broken)} looks at the page broke the law, or worlds that ended early")
 
 
 if __name__ == "__main__":
