@@ -31,7 +31,10 @@ def test_the_code_of_the_guide_runs(tmp_path):
     ("page", "told"),
     [
         ("```python\nimport pytest\n```\n", "does not say that this block needs pytest"),
-        ("It needs `pytest`.\n\n```python\nimport pytest\n```\n\n```python\npytest.skip\n```\n", "uses pytest"),
+        (
+            "It needs `pytest`.\n\n```python\nimport pytest\n```\n\n```python\npytest.skip\n```\n",
+            "uses pytest",
+        ),
         ("```python\nimport numpy\nnumpy.none\n```\n", "has no attribute 'none'"),
     ],
 )

@@ -150,7 +150,8 @@ fn pictures_of_another_size_are_cropped_and_resized_on_demand() {
 fn without_agreement_with_the_readings_the_network_alone_decides() {
     let bench = Bench::new();
     // A pattern that no network has seen.
-    let odd: Vec<f32> = (0..4096).map(|at| ((at / 64 * 5 + at % 64 * 3) % 7) as f32 / 6.0).collect();
+    let odd: Vec<f32> =
+        (0..4096).map(|at| ((at / 64 * 5 + at % 64 * 3) % 7) as f32 / 6.0).collect();
     bench.write("in.npy", &npy::encode(&[64, 64], &odd));
     let sharp = |more: &[&str]| {
         let all = ["deblur", "in.npy", "--out", "out.npy", "--overwrite", "--backend", "cpu"];
@@ -226,7 +227,9 @@ fn less_light_or_a_higher_demand_is_a_shorter_range() {
         report(&bench, &[&all, more].concat())["snr_per_pixel"].as_f64().unwrap()
     };
     let snr = budget(&[]);
-    assert!(budget(&["--exposure-us", "100"]) > 1.5 * snr && budget(&["--reflectance", "0.5"]) < snr);
+    assert!(
+        budget(&["--exposure-us", "100"]) > 1.5 * snr && budget(&["--reflectance", "0.5"]) < snr
+    );
 }
 
 #[test]
