@@ -52,6 +52,7 @@ by_name=(
     "miri            unit tests of the wire protocol in Rust's interpreter, which sees undefined behaviour; rustup's nightly with miri"
     "loom            hand-overs between threads of the live page and of a recording, in every order of the threads; crates.io"
     "page-faults     deliberate faults in the live page's JavaScript are seen; Debian's Chromium, PyPI"
+    "led-truth       what the page says of the LEDs beside the camera's own log, over EVENTS random events (10000); Debian's Chromium, PyPI"
     "fuzz            a search for bytes that break a reader's law, FUZZ_S seconds for each (4); a C++ compiler, crates.io"
     "coverage        lines of each reader that its tests with damaged bytes reach; rustup's llvm-tools"
     "crowd           nirspi serve among 1000 clients that misbehave, for CROWD_S seconds (600)"
@@ -369,6 +370,25 @@ step_page() {
     # The packages' own services stay off: the check runs both programs as docs/live-page.md has them.
     RUNLEVEL=1 debian nginx caddy openssl || echo "no nginx and no caddy installed here"
     PATH=$PATH:/usr/sbin in_browser check.py
+    led_truth 200
+}
+
+step_led_truth() { led_truth "${EVENTS:-10000}"; }
+
+# The page's word about the LEDs beside the camera's own log, over so many random events.
+led_truth() {
+    debian chromium || echo "no chromium installed here"
+    if [ -x /usr/bin/chromium ]; then
+        cargo build --locked --release
+        # Not a release build, for the reason in step `web`.
+        cargo build --locked --example led_log
+        python_with browser playwright==1.65.2
+        local built=${CARGO_TARGET_DIR:-target}
+        target/browser/bin/python host/cli/tests/browser/led_truth.py "$built/release/nirspi" "$built/debug/examples/led_log" \
+            --events "$1" --seed "${SEED:-1}" --worlds "${WORLDS:-8}"
+    else
+        echo "skipped: led_truth.py, no chromium"
+    fi
 }
 
 # After the book, which would remove the page.
@@ -414,7 +434,7 @@ step_tcp() {
 
 step_recordings() {
     cargo build --locked --release
-    python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6
+    python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 pillow
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
     target/recordings/bin/python host/cli/tests/recordings/check.py target/release/nirspi

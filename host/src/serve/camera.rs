@@ -143,8 +143,9 @@ fn switched_off(fault: Fault) -> String {
 /// If the link ends.
 pub(super) fn darken(shared: &Shared, session: &mut Session) -> Result<bool, SessionError> {
     let dark = is_dark(shared, session)?;
-    let leds = if dark { Leds::Off } else { Leds::On };
-    shared.enter(Phase::Stopped, leds, "stopped: a person switched the LEDs off".to_owned());
+    let line = "stopped: a person switched the LEDs off".to_owned();
+    lock(&shared.camera).enter(Phase::Stopped, line);
+    shared.slot.wake();
     Ok(dark)
 }
 
@@ -154,6 +155,7 @@ pub(super) fn darken(shared: &Shared, session: &mut Session) -> Result<bool, Ses
 /// # Errors
 /// If the link ends.
 pub(super) fn is_dark(shared: &Shared, session: &mut Session) -> Result<bool, SessionError> {
+    let asked = Instant::now();
     // The camera's own word counts, whatever was sent before.
     let mut ask = || {
         let dark = session.status(&mut EventLog(shared))?.state != Device::Running;
@@ -168,7 +170,7 @@ pub(super) fn is_dark(shared: &Shared, session: &mut Session) -> Result<bool, Se
         Ok(false) => Leds::On,
         Err(_) => Leds::Unknown,
     };
-    lock(&shared.camera).camera.leds_are(leds);
+    lock(&shared.camera).camera.leds_were(leds, asked);
     shared.slot.wake();
     answer
 }

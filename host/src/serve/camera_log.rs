@@ -68,9 +68,14 @@ pub struct CameraState {
 impl CameraState {
     /// Records what is known of the LEDs now.
     pub fn leds_are(&mut self, leds: Leds) {
+        self.leds_were(leds, Instant::now());
+    }
+
+    /// Records what was true of the LEDs at a moment. An answer of the camera may be as old as its question.
+    pub fn leds_were(&mut self, leds: Leds, at: Instant) {
         self.leds = leds;
         if leds != Leds::Unknown {
-            self.leds_known = Instant::now();
+            self.leds_known = at;
         }
     }
 

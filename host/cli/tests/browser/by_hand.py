@@ -707,6 +707,12 @@ def silent(told):
     page.evaluate("() => { isSilent = false; }")
     expect(leds).to_have_text("LEDs off, stopped")
     expect(page.locator("#scrub-text")).to_have_text("live")
+    # The camera's word was old when the state brought it: both ages together count.
+    told.tell(camera={"leds": "off", "leds_age_ms": 1900})
+    told.has("leds", "LEDs off, stopped")
+    page.evaluate("() => { isSilent = true; }")
+    expect(leds).to_have_text("LEDs unknown, last seen 2 s ago: no answer from the camera", timeout=1500)
+    page.evaluate("() => { isSilent = false; }")
     # The server's own link to the camera is silent.
     told.tell(camera={"leds": "unknown", "leds_age_ms": 4100})
     told.has("leds", "LEDs unknown, last seen 4 s ago: no answer from the camera")

@@ -22,6 +22,7 @@ mod everyday;
 mod foreign_devices;
 mod many;
 mod metrics;
+mod options;
 mod other_forms;
 mod packaging;
 mod pairs;

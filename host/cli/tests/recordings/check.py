@@ -1,5 +1,5 @@
 """Checks that other programs read what nirspi records and exports: the Python packages mcap,
-mcap-protobuf-support, numpy and, where there is one, rerun.
+mcap-protobuf-support, numpy, Pillow and, where there is one, rerun.
 
 Usage: check.py path/to/nirspi
 """
@@ -12,6 +12,10 @@ from pathlib import Path
 import numpy as np
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+
+# No compiled files beside the sources.
+sys.dont_write_bytecode = True
+import fields
 
 nirspi = str(Path(sys.argv[1]).resolve())
 folder = Path(tempfile.mkdtemp())
@@ -76,6 +80,11 @@ assert npz["sequence"].tolist() == list(range(12)) and npz["simulated"] == 1
 
 csv = np.genfromtxt(folder / "out.csv", delimiter=",", names=True, skip_header=2)
 assert np.array_equal(csv["d"], npz["d"]) and np.array_equal(csv["h_row"], npz["h_row"])
+
+parts, wire_times = fields.recording(folder / "rec.mcap", 12)
+fields.telemetry(recorded, 12)
+fields.arrays(folder, parts, wire_times)
+fields.pictures(folder)
 
 # The camera's time is longer than that of one depth map.
 run("capture", "--frames", "1100", "--sampling", "0.02", "--sweeps", "60", "--out", "long.mcap")

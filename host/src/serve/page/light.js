@@ -1,6 +1,6 @@
 // The switch of the LEDs: always in reach, by button and by key.
 
-import { words as lastSeen } from "./age.js";
+import { FRESH_MS, words as lastSeen } from "./age.js";
 import { GONE, send } from "./connection.js";
 import { $, foreign, text } from "./dom.js";
 import { say } from "./speech.js";
@@ -85,8 +85,12 @@ document.addEventListener("click", event => {
 $("stop").onclick = stop;
 $("start").onclick = $("resume").onclick = $("try-again").onclick = start;
 
+// How old the camera's word that its LEDs are off was in the newest state; null while the state says anything else.
+let offAge = null;
+
 export function show({ camera, light }) {
   const { leds, phase } = camera;
+  offAge = leds === "off" ? camera.leds_age_ms : null;
   document.body.dataset.leds = leds;
   const isStopping = leds === "on" && !light.allowed, known = isStopping ? "stopping" : leds === "off" && !light.allowed
     ? "LEDs off, stopped" : `LEDs ${foreign(leds)}`;
@@ -104,6 +108,13 @@ export function show({ camera, light }) {
 function unknown(age, why) {
   text($("leds"), `LEDs unknown, ${age}: ${why}`);
   say("leds", `LEDs unknown: ${why}`);
+}
+
+// The newest state is so old. The camera's word that the state brought is older, and other hosts may have the camera since.
+export function age(stateAge) {
+  if (offAge === null || offAge + stateAge <= FRESH_MS) return;
+  document.body.dataset.leds = "unknown";
+  unknown(lastSeen(offAge + stateAge), "no answer from the camera");
 }
 
 // There is no state of the last seconds.

@@ -71,7 +71,7 @@ const age = () => at === null ? Infinity : since(at);
 
 // Says that what the page shows is old. A command that was answered is no state.
 function look() {
-  if (!why && age() <= FRESH_MS) return;
+  if (!why && age() <= FRESH_MS) return light.age(age());
   document.body.dataset.phase = "unserved";
   says(foreign(why || GONE.line));
   light.showGone(words(age()));
