@@ -429,6 +429,7 @@ step_tcp() {
     grep -q '"received": 2000' "$out/capture.json"
     wait "$server"
     "$nirspi" reconstruct "$out/rec.mcap" --method hadamard --out "$out/rec"
+    NIRSPI_CLI=$PWD/$nirspi cargo test --locked -p nirspi-cli --test cli -- --ignored a_million
     NIRSPI=$PWD/$nirspi bash boards/hil.sh --minutes 0.2 --out "$out/hil"
 }
 

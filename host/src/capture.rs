@@ -220,7 +220,7 @@ pub enum CaptureError {
     /// The recording cannot be continued, because the disk is full or gone.
     #[error(
         "{path}: cannot record any more, {held} of the {} frames received are whole in the file and kept",
-        .counters.received
+        .captured.counters.received
     )]
     RecordingCut {
         /// The file.
@@ -229,8 +229,8 @@ pub enum CaptureError {
         source: io::Error,
         /// Number of frames in the file, counted by reading the file again.
         held: u64,
-        /// The account of the run. The last frames of the account are not in the file.
-        counters: LossCounters,
+        /// The run. Its last frames are not in the file.
+        captured: Box<Capture>,
     },
 }
 

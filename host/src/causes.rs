@@ -23,7 +23,31 @@ pub fn in_one_line(error: &(dyn Error + 'static)) -> String {
         line.push_str(&error.to_string());
         cause = error.source();
     }
-    cut(printable(line.replace('\n', " ").trim_end()))
+    cut(with_short_numbers(&printable(line.replace('\n', " ").trim_end())))
+}
+
+/// The most characters of a number in a line. The longest f64 that is told apart from its neighbours has 17 digits.
+const LONGEST_NUMBER: usize = 40;
+
+/// The text with numbers of more than [`LONGEST_NUMBER`] characters as powers of ten: `Display` writes 1e308 with 309
+/// digits.
+fn with_short_numbers(line: &str) -> String {
+    let mut short = String::with_capacity(line.len());
+    let mut rest = line;
+    while let Some(start) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (before, number) = rest.split_at(start);
+        let end = number.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(number.len());
+        let (number, after) = number.split_at(end);
+        short.push_str(before);
+        match number.parse::<f64>() {
+            Ok(value) if number.len() > LONGEST_NUMBER && value.is_finite() => {
+                short.push_str(&format!("{value:e}"));
+            }
+            _ => short.push_str(number),
+        }
+        rest = after;
+    }
+    short + rest
 }
 
 fn cut(line: String) -> String {
@@ -77,6 +101,26 @@ mod tests {
         let line = in_one_line(&error);
         assert!(line.ends_with(r"unknown field `\u{1b}[2J\r\u{2028}`"), "{line:?}");
         assert!(!line.contains(char::is_control), "{line:?}");
+    }
+
+    #[test]
+    fn a_number_of_hundreds_of_digits_is_told_as_a_power_of_ten() {
+        let line = |text: String| in_one_line(&io::Error::other(text));
+        assert_eq!(
+            line(format!("dark is {}, expected 0 to 8191.5", 1e308)),
+            "dark is 1e308, expected 0 to 8191.5"
+        );
+        assert_eq!(
+            line(format!("it is {}.", -f64::MIN_POSITIVE)),
+            "it is -2.2250738585072014e-308."
+        );
+        // Not a number of ours.
+        let digits = "7".repeat(400);
+        assert_eq!(line(digits.clone()), digits);
+        assert_eq!(
+            line("0.30000000000000004 of 18446744073709551615".into()),
+            "0.30000000000000004 of 18446744073709551615"
+        );
     }
 
     /// Found by `tests/fuzz`: the name of an unknown field fills a terminal.

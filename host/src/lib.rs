@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.

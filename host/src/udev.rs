@@ -6,6 +6,7 @@
 
 use crate::files::FileError;
 use crate::files::output::keep;
+use crate::files::read_small_text;
 use nirspi_wire::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 use std::fs;
 use std::io;
@@ -133,7 +134,7 @@ impl RuleError {
 /// If another file has the rule's name, or the rule cannot be read.
 pub fn check(folder: &Path) -> Result<Installed, RuleError> {
     let path = folder.join(RULE_NAME);
-    match fs::read_to_string(&path) {
+    match read_small_text(&path) {
         Ok(text) if text == rule(group_of(&text).as_ref()) => Ok(Installed::Yes),
         Ok(text) if text.starts_with(OURS) => Ok(Installed::Other),
         Ok(_) => Err(RuleError::Foreign(path)),
@@ -151,7 +152,7 @@ pub fn install(folder: &Path, group: Option<&Group>) -> Result<bool, RuleError> 
     let path = folder.join(RULE_NAME);
     let there = match check(folder)? {
         Installed::No => None,
-        Installed::Yes | Installed::Other => fs::read_to_string(&path).ok(),
+        Installed::Yes | Installed::Other => read_small_text(&path).ok(),
     };
     let wanted = rule(group.cloned().or_else(|| group_of(there.as_deref()?)).as_ref());
     if there.as_ref() == Some(&wanted) {

@@ -110,6 +110,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut preview = Preview::new(watch);
     let captured = observe(&mut session, &options, &mut preview);
     drop(bar);
+    if let Err(error) = &captured
+        && args.report.json
+        && let Some(report) = CaptureReport::of_cut(session.identity(), &choice, error)?
+    {
+        print::json(&report, &provenance::of_camera(report.camera))?;
+    }
     let captured = captured?;
     let path = captured.recording.as_deref().unwrap_or(Path::new(""));
     let report = CaptureReport::new(session.identity(), path, &choice, &captured)?;

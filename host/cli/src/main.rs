@@ -1,7 +1,9 @@
 //! The program `nirspi`. Each module reads the arguments of a command, calls the library, and
 //! prints the result.
 //!
-//! Exit codes: 0 done, 1 failed (one line on stderr says why), 2 used wrongly.
+//! Exit codes: 0 done, 1 failed (one line on stderr says why; with --strict this may be a warning), 2 used wrongly.
+
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod address;
 mod backend;
@@ -153,6 +155,10 @@ fn main() -> ExitCode {
         print::remark(format_args!("signals cannot be caught: {error}"));
     }
     let done = run(cli.command).and_then(|code| settings.save(&cli.general).map(|()| code));
+    let done = done.map(|code| match cli.general.strict && print::has_warned() {
+        true => ExitCode::FAILURE,
+        false => code,
+    });
     done.unwrap_or_else(|error| {
         print::complain(one_line(&error));
         let used_wrongly =

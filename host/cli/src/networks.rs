@@ -50,7 +50,7 @@ pub struct ImageArgs {
 impl ImageArgs {
     /// Reads the images, which must have this side. Noise below black and above white is cut.
     pub fn read(&self, side: usize) -> Result<ImageStack> {
-        let mut images = ImageStack::read(&self.input, self.resize.then_some(side as u32))?;
+        let mut images = ImageStack::read(&self.input, side as u32, self.resize)?;
         let cut = images.cut_noise();
         if cut > 0 {
             let (path, values) = (self.input.display(), count_of(cut, "value"));

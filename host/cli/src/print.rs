@@ -13,6 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 static QUIET: AtomicBool = AtomicBool::new(false);
 static VERBOSE: AtomicBool = AtomicBool::new(false);
+static WARNED: AtomicBool = AtomicBool::new(false);
 
 /// How much the program says from now on.
 pub fn say(quiet: bool, verbose: bool) {
@@ -23,6 +24,11 @@ pub fn say(quiet: bool, verbose: bool) {
 /// Whether notes, remarks and progress are switched off.
 pub fn is_quiet() -> bool {
     QUIET.load(Relaxed)
+}
+
+/// Whether a warning was printed.
+pub fn has_warned() -> bool {
+    WARNED.load(Relaxed)
 }
 
 /// Prints one line. A reader that has closed the pipe (`nirspi demo | head -1`) does not count as a
@@ -61,6 +67,7 @@ pub fn complain(text: impl fmt::Display) {
 
 /// Prints what a user must know of a result, on stderr, with --quiet too.
 pub fn warning(text: impl fmt::Display) {
+    WARNED.store(true, Relaxed);
     complain(format_args!("warning: {text}"));
 }
 

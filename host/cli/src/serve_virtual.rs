@@ -59,6 +59,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let stop = interrupt::stop_flag();
     let address = listener.local_addr()?;
     print::line(format_args!("virtual camera on tcp:{address}: {scene}"))?;
+    if !address.ip().is_loopback() {
+        print::warning(format_args!(
+            "--listen {}: every machine in this network can use this camera; there is no token",
+            args.listen
+        ));
+    }
     let options = ServeOptions {
         once: args.once,
         drop_when_full: args.drop_when_full,

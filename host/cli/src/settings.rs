@@ -25,6 +25,9 @@ pub struct GeneralArgs {
     /// Print results, warnings and errors; no notes, no progress
     #[arg(short, long, global = true)]
     pub quiet: bool,
+    /// Exit with code 1 also where the command has succeeded with a warning
+    #[arg(long, global = true)]
+    pub strict: bool,
     /// Also print, on stderr, the time of each stage and where each default comes from
     #[arg(short, long, global = true)]
     pub verbose: bool,
@@ -39,8 +42,8 @@ pub struct GeneralArgs {
 }
 
 /// Options that say what to do with settings, and options that belong to one run.
-const NEVER_SAVED: [&str; 8] =
-    ["settings", "save-settings", "quiet", "verbose", "json", "out", "overwrite", "help"];
+const NEVER_SAVED: [&str; 9] =
+    ["settings", "save-settings", "quiet", "strict", "verbose", "json", "out", "overwrite", "help"];
 /// Options whose value is neither saved nor shown.
 const SECRET: [&str; 1] = ["token"];
 /// Options that cannot have a default.

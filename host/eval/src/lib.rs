@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! Every report is a plain struct that serialises to JSON, and the library prints nothing. Long

@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! Enhances reconstructed images to the 64 x 64 output: fusion with depth by FSRCNN, deblurring by

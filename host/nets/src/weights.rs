@@ -9,6 +9,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
+use std::io::Read as _;
 use std::path::Path;
 use std::{fs, io};
 
@@ -35,7 +36,7 @@ pub(crate) const CHECKSUM: &str = "sha256";
 #[non_exhaustive]
 pub enum WeightsError {
     /// The file cannot be read.
-    #[error("{file}: {source}")]
+    #[error("{file}: the weights cannot be read")]
     Read {
         /// The file.
         file: String,
@@ -235,6 +236,9 @@ pub(crate) fn header(
     Ok((length, header.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect()))
 }
 
+/// The largest file of weights that is read. The largest shipped one has 3 MB.
+const MAX_FILE_BYTES: u64 = 1 << 30;
+
 impl Weights {
     /// Empty weights. `label` names them in errors.
     pub fn new(label: &str) -> Self {
@@ -249,9 +253,19 @@ impl Weights {
     pub fn read(file: &Path) -> Result<Self, WeightsError> {
         let label = file.display().to_string();
         let bytes = fs::metadata(file).and_then(|found| match found.is_file() {
-            true => fs::read(file),
+            true => {
+                let mut bytes = Vec::new();
+                fs::File::open(file)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+                match bytes.len() as u64 <= MAX_FILE_BYTES {
+                    true => Ok(bytes),
+                    false => Err(io::Error::new(io::ErrorKind::InvalidInput, "more than 1 GiB")),
+                }
+            }
             // Opening a pipe would wait for a writer, and a device may never end.
-            false => Err(io::Error::new(io::ErrorKind::InvalidInput, "not a file")),
+            false => Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "a device or pipe, expected a file",
+            )),
         });
         match bytes {
             Ok(bytes) => Self::parse(&label, &bytes),

@@ -1,3 +1,4 @@
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 #![doc = include_str!("../README.md")]
 //!
 //! Every function is a pure function of its arguments: no file, no clock, no thread that outlives a

@@ -3,7 +3,8 @@
 //! # Invariant
 //! A recording holds at most [`ALLOWED`] bytes of junk plus as many bytes as its frames, not
 //! counting a trickle of other messages (`tests::junk_alone_is_too_much_after_the_allowance`,
-//! `tests::frames_pay_for_as_much_junk`).
+//! `tests::frames_pay_for_as_much_junk`), however short the packets are
+//! (`tests::short_packets_count_as_long_as_they_are_in_the_recording`).
 
 use crate::clock::Instant;
 use nirspi_wire::{DeviceMessage, PacketError};
@@ -15,7 +16,10 @@ const ALLOWED: u64 = 64 << 20;
 /// 150 bytes, 60 times a second.
 const TRICKLE_PER_S: u64 = 64 << 10;
 
-/// Counts a run's frames and junk, in bytes.
+/// Bytes that a recording adds to each packet: the head of an MCAP message and its place in the index.
+const RECORDED: u64 = 31 + 16;
+
+/// Counts a run's frames and junk, in bytes of a recording.
 #[derive(Debug)]
 pub(super) struct Junk {
     began: Instant,
@@ -24,12 +28,14 @@ pub(super) struct Junk {
     useless: u64,
     /// Intact messages other than frames.
     messages: u64,
+    /// Useless packets and messages, in bytes of the link.
+    came: u64,
     too_much: bool,
 }
 
 impl Junk {
     pub(super) fn new(began: Instant) -> Self {
-        Self { began, frames: 0, useless: 0, messages: 0, too_much: false }
+        Self { began, frames: 0, useless: 0, messages: 0, came: 0, too_much: false }
     }
 
     /// Counts a packet of this many bytes at `now`. `new_frame` says whether the packet was a new
@@ -46,7 +52,8 @@ impl Junk {
             Err(_) | Ok(DeviceMessage::Frame(_)) => &mut self.useless,
             Ok(_) => &mut self.messages,
         };
-        *count += bytes as u64;
+        *count += bytes as u64 + RECORDED;
+        self.came += if new_frame { 0 } else { bytes as u64 };
         let elapsed = now.saturating_duration_since(self.began) + Duration::from_secs(1);
         self.too_much |= self.excess(elapsed) > ALLOWED + self.frames;
     }
@@ -61,9 +68,9 @@ impl Junk {
         self.too_much
     }
 
-    /// Number of bytes of junk.
+    /// Number of bytes of junk that came over the link.
     pub(super) fn bytes(&self) -> u64 {
-        self.useless + self.messages
+        self.came
     }
 }
 
@@ -79,12 +86,26 @@ mod tests {
         let now = Instant::now();
         let mut junk = Junk::new(now);
         for _ in 0..64 {
-            junk.packet(1 << 20, &DAMAGED, false, now);
+            junk.packet((1 << 20) - RECORDED as usize, &DAMAGED, false, now);
             assert!(!junk.is_too_much());
         }
         junk.packet(1, &DAMAGED, false, now);
         assert!(junk.is_too_much());
-        assert_eq!(junk.bytes(), (64 << 20) + 1);
+        assert_eq!(junk.bytes(), (64 << 20) - 64 * RECORDED + 1);
+    }
+
+    /// 67 MB of short damaged packets once became a recording of 698 MB.
+    #[test]
+    fn short_packets_count_as_long_as_they_are_in_the_recording() {
+        let now = Instant::now();
+        let mut junk = Junk::new(now);
+        let mut packets = 0;
+        while !junk.is_too_much() {
+            junk.packet(5, &DAMAGED, false, now);
+            packets += 1;
+        }
+        assert_eq!(packets, ALLOWED / (5 + RECORDED) + 1);
+        assert_eq!(junk.bytes(), 5 * packets);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The report of a capture, for people and scripts.
 
-use super::Capture;
+use super::{Capture, CaptureError};
 use crate::account::{FailedChecks, LossCounters};
 use crate::calibration::{Choice, Origin};
 use crate::causes::in_one_line;
@@ -96,5 +96,22 @@ impl<'r> CaptureReport<'r> {
             calibration_note: choice.note.as_deref(),
             calibration_problem: captured.calibration_problem.as_ref().map(|p| in_one_line(p)),
         })
+    }
+
+    /// The report of a capture whose recording could not be finished, because the disk was full or went away; `None`
+    /// for any other error.
+    ///
+    /// # Errors
+    /// If the file is gone.
+    pub fn of_cut(
+        camera: &'r CameraIdentity,
+        choice: &'r Choice,
+        error: &'r CaptureError,
+    ) -> io::Result<Option<Self>> {
+        let CaptureError::RecordingCut { path, captured, .. } = error else { return Ok(None) };
+        let report = Self::new(camera, path, choice, captured)?;
+        let missing = std::iter::once(in_one_line(error)).chain(report.missing);
+        let missing = Some(missing.collect::<Vec<_>>().join("; "));
+        Ok(Some(Self { complete: false, missing, ..report }))
     }
 }

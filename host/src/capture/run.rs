@@ -370,7 +370,13 @@ impl Run {
             elapsed: self.started.elapsed(),
         };
         if let Some(recorder) = self.recorder {
-            captured.recording = Some(finish(recorder, self.recorder_error, &captured)?);
+            match finish(recorder, self.recorder_error, &captured) {
+                Ok(path) => captured.recording = Some(path),
+                Err((path, source)) => {
+                    let (held, captured) = (frames_held(&path), Box::new(captured));
+                    return Err(CaptureError::RecordingCut { path, source, held, captured });
+                }
+            }
         }
         Ok(captured)
     }
@@ -434,26 +440,18 @@ impl Run {
     }
 }
 
-/// Closes the recording of a capture. Returns its path.
+/// Closes the recording of a capture. Returns its path, also beside the reason why it could not be finished.
 fn finish(
     recorder: Recorder,
     failed: Option<io::Error>,
     captured: &Capture,
-) -> Result<PathBuf, CaptureError> {
+) -> Result<PathBuf, (PathBuf, io::Error)> {
     let Capture { counters, asked, made, .. } = *captured;
     let account = RunAccount { counters, asked, made, missing: captured.missing() };
-    let finished = match failed {
+    match failed {
         None => recorder.finish(&account),
-        Some(error) => {
-            let path = recorder.path().to_owned();
-            drop(recorder);
-            Err((path, error))
-        }
-    };
-    finished.map_err(|(path, source)| {
-        let held = frames_held(&path);
-        CaptureError::RecordingCut { path, source, held, counters }
-    })
+        Some(error) => Err((recorder.path().to_owned(), error)),
+    }
 }
 
 /// Number of frames in a file; 0 for a device or a file that cannot be read.

@@ -6,7 +6,7 @@ use crate::files::measurement::{NOISE, PROVENANCE};
 use crate::files::npy::{Element, encode, encode_text, header};
 use crate::files::output::{Existing, write_in_pieces, write_result};
 use crate::provenance::Provenance;
-use std::io::{self, Seek, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -20,7 +20,8 @@ pub(super) fn npz(
     provenance: &Provenance,
 ) -> Result<(), ExportError> {
     write_in_pieces(out, existing, |file| {
-        let mut zip = Members { zip: ZipWriter::new(file), out };
+        let mut file = Until { file, at: 0, ended: false };
+        let mut zip = Members { zip: ZipWriter::new(&mut file), out };
         let rows = whole.source.measurements.rows();
         let h_row: Vec<i64> = rows.iter().map(|&row| row.into()).collect();
         let [m, count] = [h_row.len(), whole.frames()];
@@ -41,6 +42,43 @@ pub(super) fn npz(
         zip.zip.finish().map_err(wrong)?;
         Ok(())
     })
+}
+
+/// A file that takes bytes until its first error, and lets what follows go by. A `ZipWriter` that is dropped after an
+/// error tries to write its index all the same, and prints why it cannot; the first error is ours to tell.
+struct Until<W> {
+    file: W,
+    /// Where the next bytes go, or would go.
+    at: u64,
+    ended: bool,
+}
+
+impl<W: Write> Write for Until<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let taken = if self.ended { Ok(bytes.len()) } else { self.file.write(bytes) };
+        self.ended |= taken.is_err();
+        self.at += *taken.as_ref().unwrap_or(&0) as u64;
+        taken
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let flushed = if self.ended { Ok(()) } else { self.file.flush() };
+        self.ended |= flushed.is_err();
+        flushed
+    }
+}
+
+impl<W: Seek> Seek for Until<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let at = match to {
+            _ if !self.ended => self.file.seek(to),
+            SeekFrom::Start(at) => Ok(at),
+            SeekFrom::Current(by) | SeekFrom::End(by) => Ok(self.at.saturating_add_signed(by)),
+        };
+        self.ended |= at.is_err();
+        self.at = *at.as_ref().unwrap_or(&self.at);
+        at
+    }
 }
 
 struct Members<'o, W: Write + Seek> {

@@ -229,9 +229,7 @@ pub(super) fn shape_text(shape: &[u64]) -> String {
     }
 }
 
-/// The most memory that the numbers of a field may take, in any format: 512 sweeps of 256 x 256 pairs
-/// in float64. A byte of a packed file can become a thousand numbers.
-pub(super) const MAX_MEMORY_BYTES: u64 = 512 << 20;
+pub(super) use super::plain::MAX_MEMORY_BYTES;
 
 /// Refuses a field of this shape before its numbers are read, if they take more than
 /// [`MAX_MEMORY_BYTES`] as float64, twice as many where they are complex.

@@ -32,25 +32,22 @@ fn find(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
         return Err(FileError::kind(folder, "no measurement file in the folder", EXPECTED));
     }
     names.sort_unstable();
-    let path_of =
-        |name: String| name.split('/').fold(folder.to_owned(), |path, part| path.join(part));
-    Ok(names.into_iter().map(path_of).collect())
+    Ok(names.into_iter().map(|(_, path)| path).collect())
 }
 
 /// The names of the measurement files, relative to the folder where the search began, with `/`
-/// between them.
-fn collect(folder: &Path, prefix: &str, names: &mut Vec<String>) -> Result<(), FileError> {
+/// between them, and their paths. A name that is no UTF-8 is among them, so that its file is told to give no image.
+fn collect(
+    folder: &Path,
+    prefix: &str,
+    names: &mut Vec<(String, PathBuf)>,
+) -> Result<(), FileError> {
     let refused = |error| FileError::io(folder, "read", error);
     for entry in std::fs::read_dir(folder).map_err(refused)? {
         let entry = entry.map_err(refused)?;
         let (file_name, path) = (entry.file_name(), entry.path());
         let kind = entry.file_type().map_err(refused)?;
-        let Some(name) = file_name.to_str() else {
-            if is_measurement(&path) {
-                return Err(FileError::kind(&path, "a name that is no UTF-8", "a name in UTF-8"));
-            }
-            continue;
-        };
+        let name = file_name.to_string_lossy();
         if name.starts_with('.') {
             continue;
         }
@@ -58,7 +55,7 @@ fn collect(folder: &Path, prefix: &str, names: &mut Vec<String>) -> Result<(), F
         if kind.is_dir() {
             collect(&path, &format!("{name}/"), names)?;
         } else if !path.is_dir() && is_measurement(&path) {
-            names.push(name);
+            names.push((name, path));
         }
     }
     Ok(())
@@ -72,6 +69,17 @@ fn is_measurement(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_name_that_is_no_utf_8_is_found_beside_the_others() {
+        use std::os::unix::ffi::OsStrExt;
+        let root = tempfile::tempdir().unwrap();
+        let odd = root.path().join(OsStr::from_bytes(b"b\xff.npz"));
+        let names = [root.path().join("a.npz"), odd, root.path().join("c.npz")];
+        names.iter().for_each(|name| std::fs::write(name, "x").unwrap());
+        assert_eq!(measurement_files(&[root.path().to_owned()]).unwrap(), names);
+    }
 
     #[test]
     fn files_are_found_in_every_folder_in_one_order() {

@@ -25,6 +25,10 @@ pub(super) struct Hdf5 {
 
 impl Hdf5 {
     pub(super) fn open(path: &Path, bytes: Vec<u8>, is_matlab: bool) -> Result<Self, FileError> {
+        if let Some((found, expected)) = cut_at(&bytes) {
+            let lengths = format!("{found} bytes, {expected} by its superblock");
+            return Err(damaged(path, lengths));
+        }
         let options = OpenOptions::default()
             .with_max_chunk_bytes(MAX_FIELD_BYTES)
             .with_max_read_bytes(MAX_FIELD_BYTES);
@@ -59,7 +63,14 @@ impl Hdf5 {
         }
         let parts = parts(data.dtype());
         let Some((element_bytes, parts)) = parts else {
-            return Err(refuse("is no array of numbers".to_owned(), "numbers of up to 8 bytes"));
+            // The form of these numbers, IEEE's or another, is not among what the reader says.
+            return Err(match data.dtype() {
+                Datatype::FloatingPoint { size, .. } => {
+                    let found = format!("is an array of floating-point numbers of {size} bytes");
+                    refuse(found, "4 or 8 bytes: save it as float32")
+                }
+                _ => refuse("is no array of numbers".to_owned(), "numbers of up to 8 bytes"),
+            });
         };
         within_memory(&self.path, field, &stored, parts.1.is_some())?;
         let bytes = data.read_raw_bytes().map_err(explain)?;
@@ -76,6 +87,32 @@ impl Hdf5 {
             false => Field { shape, real, imaginary },
         })
     }
+}
+
+/// The length of a file that ends before the end-of-file address of its superblock, and that address. Such a file
+/// was cut, and h5py refuses it too. `None` for a whole file, and for a superblock that the reader judges.
+///
+/// Format: The HDF Group, *HDF5 File Format Specification* 3.0, II.A "Superblock". MATLAB has 512 bytes of its own
+/// before it; the address counts from the beginning of the file.
+fn cut_at(bytes: &[u8]) -> Option<(u64, u64)> {
+    const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+    let starts = std::iter::once(0).chain((9..).map(|power| 1 << power));
+    let mut starts = starts.take_while(|&start| start + SIGNATURE.len() <= bytes.len());
+    let start = starts.find(|&start| bytes[start..].starts_with(SIGNATURE))?;
+    let block = &bytes[start..];
+    // The place of the size of an address, and of the base address; the end-of-file address is two further.
+    let (size_at, base_at) = match block.get(8)? {
+        0 => (13, 24),
+        1 => (13, 28),
+        2 | 3 => (9, 12),
+        _ => return None,
+    };
+    let size = usize::from(*block.get(size_at)?);
+    let at = base_at + 2 * size;
+    let address = block.get(at..at + size).filter(|_| (1..=8).contains(&size))?;
+    let expected = address.iter().rev().fold(0_u64, |all, &byte| all << 8 | u64::from(byte));
+    let found = bytes.len() as u64;
+    (found < expected).then_some((found, expected))
 }
 
 /// A number within an element.

@@ -13,12 +13,13 @@ mod labelled;
 mod signed;
 
 use super::FileError;
-use super::plain::{kind_by_start, open_file};
+use super::plain::{MAX_MEMORY_BYTES, kind_by_start, open_file};
 use crate::provenance::Provenance;
 use ::image::imageops::{self, FilterType};
+use ::image::metadata::Orientation;
 use ::image::{
-    ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Luma,
-    RgbImage,
+    ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, ImageReader,
+    Limits, Luma, RgbImage,
 };
 use std::io::{BufRead, BufReader, Seek};
 use std::path::{Path, PathBuf};
@@ -28,10 +29,6 @@ pub use signed::provenance_of;
 pub(crate) use signed::sign;
 
 const EXPECTED: &str = "a PNG or JPEG image";
-/// The largest edge that the reader accepts. A scene is later averaged down to hundreds of pixels.
-const MAX_EDGE_PX: u32 = 16_384;
-/// The largest decoded picture that the reader accepts: 8192 x 8192 in 16-bit RGBA.
-const MAX_DECODED_BYTES: u64 = 512 << 20;
 
 /// A square map of reflectance in `[0, 1]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +48,7 @@ pub struct Reflectance {
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
 pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
-    let picture = decode(path)?;
+    let picture = decode(path, |_| Ok(()))?;
     let (width, height) = (picture.width(), picture.height());
     let edge = width.min(height);
     let corner = ((width - edge) / 2, (height - edge) / 2);
@@ -75,7 +72,19 @@ pub struct Grey {
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
 pub fn read_grey(path: &Path) -> Result<Grey, FileError> {
-    let picture = decode(path)?;
+    read_grey_if(path, |_| Ok(()))
+}
+
+/// As [`read_grey`], for a caller that needs pictures of a certain size: `fits` judges width and height, in pixels,
+/// before the pixels are decoded.
+///
+/// # Errors
+/// As [`read_grey`], and the errors of `fits`.
+pub fn read_grey_if<E: From<FileError>>(
+    path: &Path,
+    fits: impl FnOnce((u32, u32)) -> Result<(), E>,
+) -> Result<Grey, E> {
+    let picture = decode(path, fits)?;
     Ok(Grey { width: picture.width(), height: picture.height(), values: grey(&picture) })
 }
 
@@ -100,7 +109,12 @@ impl Grey {
     }
 }
 
-fn decode(path: &Path) -> Result<DynamicImage, FileError> {
+/// Decodes a picture. Its header says how much memory its pixels and their grey levels take, and `fits` may refuse its
+/// size; both are judged before a pixel is decoded.
+fn decode<E: From<FileError>>(
+    path: &Path,
+    fits: impl FnOnce((u32, u32)) -> Result<(), E>,
+) -> Result<DynamicImage, E> {
     let (file, _) = open_file(path, EXPECTED)?;
     let read = |error| FileError::io(path, "read", error);
     let mut stream = BufReader::new(file);
@@ -112,7 +126,7 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
             true => "a PNG image with a damaged signature",
             false => kind_by_start(start),
         };
-        return Err(FileError::kind(path, found, EXPECTED));
+        return Err(FileError::kind(path, found, EXPECTED).into());
     };
     stream.rewind().map_err(read)?;
     let labels = match format {
@@ -120,42 +134,55 @@ fn decode(path: &Path) -> Result<DynamicImage, FileError> {
         _ => None,
     };
     stream.rewind().map_err(read)?;
+    let wrong = |(found, expected): (String, &'static str)| FileError::kind(path, found, expected);
+    let labels = labels.transpose().map_err(|e| wrong((format!("labels: {e}"), EXPECTED)))?;
 
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_EDGE_PX);
-    limits.max_image_height = Some(MAX_EDGE_PX);
-    limits.max_alloc = Some(MAX_DECODED_BYTES);
-    let decoded = || {
-        let mut reader = ImageReader::with_format(stream, format);
-        reader.limits(limits.clone());
-        let mut decoder = reader.into_decoder()?;
-        limits.reserve(decoder.total_bytes())?;
-        // A phone stores the picture as its sensor was held, and the file states which side is up.
-        let orientation = decoder.orientation()?;
-        let mut picture = DynamicImage::from_decoder(decoder)?;
-        picture.apply_orientation(orientation);
-        Ok(picture)
-    };
-    let picture = decoded().map_err(|error| match error {
-        ::image::ImageError::Limits(_) => FileError::kind(
-            path,
-            "an image that is too large",
-            "at most 16384 pixels an edge and 512 MiB when decoded",
-        ),
+    let damaged = |error: ImageError| match error {
+        ImageError::Limits(_) => too_large(path, None),
         error => FileError::Damaged {
             path: path.to_owned(),
             found: error.to_string(),
             expected: EXPECTED,
         },
-    })?;
-    let wrong = |(found, expected): (String, &'static str)| FileError::kind(path, found, expected);
+    };
+    let mut reader = ImageReader::with_format(stream, format);
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MAX_MEMORY_BYTES);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(damaged)?;
+    // A phone stores the picture as its sensor was held, and the file states which side is up.
+    let orientation = decoder.orientation().map_err(damaged)?;
+    let (width, height) = match (decoder.dimensions(), orientation) {
+        (
+            (width, height),
+            Orientation::Rotate90
+            | Orientation::Rotate270
+            | Orientation::Rotate90FlipH
+            | Orientation::Rotate270FlipH,
+        ) => (height, width),
+        (stored, _) => stored,
+    };
+    let grey_bytes = u64::from(width) * u64::from(height) * size_of::<f32>() as u64;
+    if decoder.total_bytes().saturating_add(grey_bytes) > MAX_MEMORY_BYTES {
+        return Err(too_large(path, Some((width, height))).into());
+    }
+    // The image in a picture with labels is smaller.
+    if labels.is_none() {
+        fits((width, height))?;
+    }
+    let mut picture = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    picture.apply_orientation(orientation);
     match labels {
         None => Ok(picture),
-        Some(labels) => {
-            let labels = labels.map_err(|e| wrong((format!("labels: {e}"), EXPECTED)))?;
-            labelled::image_in(&picture, &labels).map_err(wrong)
-        }
+        Some(labels) => Ok(labelled::image_in(&picture, &labels).map_err(wrong)?),
     }
+}
+
+/// The error for a picture that takes more memory than [`MAX_MEMORY_BYTES`].
+fn too_large(path: &Path, size: Option<(u32, u32)>) -> FileError {
+    let size = size.map(|(width, height)| format!(" ({width} x {height} pixels)"));
+    let found = format!("an image that is too large{}", size.unwrap_or_default());
+    FileError::kind(path, found, "at most 512 MiB in memory, decoded and as grey levels of 4 bytes")
 }
 
 /// The ending of pictures for people beside results for programs. Folders are read without them.

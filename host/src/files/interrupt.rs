@@ -54,6 +54,10 @@ impl Signal {
 
     /// Whether the program was started so that this signal does nothing. Known on Linux alone.
     #[must_use]
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "a file of the system that says that it has 0 bytes"
+    )]
     pub fn is_ignored(self) -> bool {
         let Ok(status) = fs::read_to_string("/proc/self/status") else { return false };
         let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -9,6 +9,9 @@ use std::path::Path;
 /// The first bytes of a NumPy array.
 pub(super) const NUMPY: &[u8; 6] = b"\x93NUMPY";
 
+/// The most memory that the numbers of a file take: a field of measurements, or a picture with its grey levels.
+pub(super) const MAX_MEMORY_BYTES: u64 = 512 << 20;
+
 /// Opens a plain file. Every error names the path.
 pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u64), FileError> {
     let read = |error| FileError::io(path, "read", error);
@@ -171,6 +174,9 @@ fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<
 /// The kind of a file by its first bytes. An error message uses the kind to tell a user which file
 /// was chosen by mistake.
 pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
+    if is_mat_4(start) {
+        return "a MATLAB file of level 4 (save it again as level 5: in MATLAB with save NAME -v7, in SciPy with savemat)";
+    }
     const KINDS: [(&[u8], &str); 8] = [
         (b"PK", "a zip archive"),
         (NUMPY, "a single NumPy array (.npy)"),
@@ -185,6 +191,32 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         .iter()
         .find(|(magic, _)| start.starts_with(magic))
         .map_or("a file of another kind", |&(_, kind)| kind)
+}
+
+/// Whether a file with these first bytes is a MATLAB file of level 4: five words, of which the first is the form of the
+/// numbers (MOPT), the fourth says whether they are complex, and the fifth is the length of the name that follows
+/// with a zero at its end.
+///
+/// Format: MathWorks, *MAT-File Format*, R2023a, "Level 4 MAT-Files".
+fn is_mat_4(start: &[u8]) -> bool {
+    let word =
+        |at: usize, of: fn([u8; 4]) -> u32| Some(of(start[4 * at..].first_chunk().copied()?));
+    let head = |of: fn([u8; 4]) -> u32, order: u32| {
+        let [form, _, _, is_complex, name] = [0, 1, 2, 3, 4].map(|at| word(at, of));
+        let (form, name) = (form?, name? as usize);
+        let [thousands, hundreds, tens, ones] =
+            [form / 1000, form / 100 % 10, form / 10 % 10, form % 10];
+        let is_form = thousands == order && hundreds == 0 && tens <= 5 && ones <= 2;
+        let name = start.get(20..20_usize.checked_add(name)?)?;
+        let is_name = name.split_last().is_some_and(|(end, name)| {
+            *end == 0
+                && !name.is_empty()
+                && name.iter().all(|c| c.is_ascii_alphanumeric() || *c == b'_')
+        });
+        Some(is_form && is_complex? <= 1 && is_name)
+    };
+    start.len() >= 20
+        && (head(u32::from_le_bytes, 0) == Some(true) || head(u32::from_be_bytes, 1) == Some(true))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 
 use super::FileError;
 use super::image::{
-    FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, provenance_of, read_grey,
+    FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, provenance_of, read_grey, read_grey_if,
 };
 use super::npy;
 use super::output::{Existing, OutputDir, write_result};
@@ -26,21 +26,6 @@ pub enum StackError {
     /// The folder holds no pictures.
     #[error("{}: no .png or .jpg files in it", .0.display())]
     Empty(PathBuf),
-    /// Pictures of one folder differ in size.
-    #[error(
-        "{}: {} x {} pixels, expected {} x {} as {} has",
-        path.display(), found.0, found.1, expected.0, expected.1, first.display()
-    )]
-    Sizes {
-        /// The picture that differs.
-        path: PathBuf,
-        /// Its number of rows and columns.
-        found: (usize, usize),
-        /// The number of rows and columns of the first picture.
-        expected: (usize, usize),
-        /// The first picture.
-        first: PathBuf,
-    },
     /// The results of two pictures of a folder would have the same name.
     #[error("{}: two pictures whose result would be {name}", folder.display())]
     Twice {
@@ -101,17 +86,17 @@ enum Form {
 }
 
 impl ImageStack {
-    /// Reads a `.npy` array, a picture or a folder of pictures. With `resize`, pictures are resized
-    /// to this side.
+    /// Reads a `.npy` array, a picture or a folder of pictures, for a command that needs `side` x `side` pixels. With
+    /// `resize`, pictures are resized to that.
     ///
     /// # Errors
-    /// [`StackError`] for a file that cannot be read, or for pictures of different sizes.
-    pub fn read(path: &Path, resize: Option<u32>) -> Result<Self> {
+    /// [`StackError`] for a file that cannot be read, or for pictures of another size.
+    pub fn read(path: &Path, side: u32, resize: bool) -> Result<Self> {
         if path.is_dir() {
-            return Self::folder(path, resize);
+            return Self::folder(path, side, resize);
         }
         if is_picture(path) {
-            let picture = read_picture(path, resize)?;
+            let picture = read_picture(path, side, resize)?;
             return Ok(Self {
                 path: path.to_owned(),
                 count: 1,
@@ -127,23 +112,16 @@ impl ImageStack {
         Ok(Self { path: path.to_owned(), count, height, width, values, form })
     }
 
-    fn folder(path: &Path, resize: Option<u32>) -> Result<Self> {
+    fn folder(path: &Path, side: u32, resize: bool) -> Result<Self> {
         let files = pictures_in(path)?;
-        let Some(first) = files.first() else {
+        if files.is_empty() {
             return Err(StackError::Empty(path.to_owned()));
-        };
-        let (mut size, mut values) = (None, Vec::new());
-        for file in &files {
-            let picture = read_picture(file, resize)?;
-            let found = (picture.height as usize, picture.width as usize);
-            let expected = *size.get_or_insert(found);
-            if found != expected {
-                let (path, first) = (file.clone(), first.clone());
-                return Err(StackError::Sizes { path, found, expected, first });
-            }
-            values.extend(picture.values);
         }
-        let (height, width) = size.unwrap_or_default();
+        let mut values = Vec::new();
+        for file in &files {
+            values.extend(read_picture(file, side, resize)?.values);
+        }
+        let (height, width) = (side as usize, side as usize);
         let names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
         // The names are sorted by path, so equal names are adjacent.
         if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -355,11 +333,16 @@ impl StackTarget {
     }
 }
 
-fn read_picture(path: &Path, resize: Option<u32>) -> Result<Grey> {
-    let picture = read_grey(path)?;
-    Ok(match resize {
-        None => picture,
-        Some(side) => picture.resized(side),
+fn read_picture(path: &Path, side: u32, resize: bool) -> Result<Grey> {
+    if resize {
+        return Ok(read_grey(path)?.resized(side));
+    }
+    read_grey_if(path, |(width, height)| match (width, height) == (side, side) {
+        true => Ok(()),
+        false => {
+            let (height, width, side) = (height as usize, width as usize, side as usize);
+            Err(StackError::Size { path: path.to_owned(), height, width, side })
+        }
     })
 }
 

@@ -85,6 +85,9 @@ enum NoImage {
     Source(#[from] SourceError),
     #[error(transparent)]
     Solver(#[from] SolverError),
+    // JSON has no such names.
+    #[error("{}: found a name that is no UTF-8, expected a name in UTF-8", .0.display())]
+    Name(PathBuf),
     #[error("{}: images of {n} x {n}, expected {expected} x {expected} as of the first file", .file.display())]
     Side { file: PathBuf, n: usize, expected: usize },
 }
@@ -112,7 +115,8 @@ pub fn many_images(
         match made.and_then(|images| of_one_side(file, images, &all.images)) {
             Ok(images) => all.images.extend(images),
             Err(error) => {
-                all.skipped.push(Skipped { file: file.clone(), reason: in_one_line(&error) });
+                let file = file.to_string_lossy().into_owned().into();
+                all.skipped.push(Skipped { file, reason: in_one_line(&error) });
             }
         }
     }
@@ -138,6 +142,9 @@ fn images_of(
     options: &SourceOptions,
     solver: &Solver,
 ) -> Result<Vec<FileImage>, NoImage> {
+    if file.to_str().is_none() {
+        return Err(NoImage::Name(file.to_owned()));
+    }
     let is_one = match options.index {
         Some(Index::One(_)) => true,
         Some(Index::All) => false,

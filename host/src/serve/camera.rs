@@ -403,8 +403,8 @@ impl Live {
             Err(CaptureError::Stopped) => return Ok(None),
             // The run has ended, the camera has not.
             Err(error @ (CaptureError::Recording { .. } | CaptureError::RecordingCut { .. })) => {
-                if let CaptureError::RecordingCut { counters, .. } = &error {
-                    self.ended_with(*counters);
+                if let CaptureError::RecordingCut { captured, .. } = &error {
+                    self.ended_with(captured.counters);
                     self.failed = lock(&self.shared.camera).camera.said.failed_checks;
                 }
                 self.record_no_more();

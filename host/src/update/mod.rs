@@ -9,7 +9,7 @@ mod release;
 #[cfg(all(test, feature = "virtual-camera"))]
 mod tests;
 
-use crate::boards::Board;
+use crate::boards::{Board, is_simulated};
 use crate::files::FileError;
 use crate::fpga::Fpga;
 use crate::gateware::{self, GatewareError};
@@ -46,6 +46,17 @@ pub enum UpdateError {
         path: PathBuf,
         /// The parser's reason.
         source: serde_json::Error,
+    },
+    /// The manifest lists no file at all.
+    #[error("{}: the release has no files, expected firmware or gateware: get the release again", .0.display())]
+    Empty(PathBuf),
+    /// The camera has no FPGA that takes a bitstream.
+    #[error("{file}: gateware, but the camera's board is {board}, which loads none")]
+    LoadsNone {
+        /// The file of the release.
+        file: String,
+        /// The camera's board.
+        board: String,
     },
     /// The manifest does not list a file.
     #[error("{}: does not list {file}", manifest.display())]
@@ -207,6 +218,13 @@ impl Plan {
             board: camera.board.clone(),
             firmware: firmware.map(|asset| change(asset, &camera.firmware)).transpose()?,
             gateware: bitstream.map(|asset| change(asset, &camera.gateware)).transpose()?,
+        })
+        .and_then(|plan| match &plan.gateware {
+            Some(gateware) if is_simulated(&camera.board) => {
+                let (file, board) = (gateware.asset.file.clone(), camera.board.clone());
+                Err(UpdateError::LoadsNone { file, board })
+            }
+            _ => Ok(plan),
         })
     }
 

@@ -107,6 +107,9 @@ impl Release {
         }
         let text = read_text(&manifest, "the manifest of a release")?;
         let mut release = Self { folder: folder.to_owned(), manifest: read(&manifest, &text)? };
+        if release.manifest.files.is_empty() {
+            return Err(UpdateError::Empty(manifest));
+        }
         if !is_folder {
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
             release.manifest.files.retain(|asset| asset.file == name);

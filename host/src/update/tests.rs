@@ -67,7 +67,7 @@ fn a_release_updates_the_fpga_of_a_camera_and_its_version_is_checked() {
     let (link, loaded) = camera();
     let mut session = Session::open(Box::new(link)).unwrap();
     let file = Release::open(&release.join("ecp5-evn.bit")).unwrap();
-    let mut plan = Plan::new(&file, session.identity()).unwrap();
+    let mut plan = Plan::new(&file, &identity(|_| {})).unwrap();
     assert!(plan.firmware.is_none());
     let mut change = plan.gateware.take().unwrap();
     load_gateware(&mut session, &change, &mut |_| {}).unwrap();
@@ -76,6 +76,23 @@ fn a_release_updates_the_fpga_of_a_camera_and_its_version_is_checked() {
     change.asset.version = "9.9.9".into();
     let error = load_gateware(&mut session, &change, &mut |_| {}).unwrap_err();
     assert!(matches!(error, UpdateError::NotRunning { .. }), "{error}");
+}
+
+#[test]
+fn a_release_without_files_and_gateware_for_a_camera_without_an_fpga_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let release = release(folder.path());
+    for board in ["virtual", "mps2-an505"] {
+        let line =
+            refusal(&release.join("ecp5-evn.bit"), &identity(|camera| camera.board = board.into()));
+        assert_eq!(
+            line,
+            format!("ecp5-evn.bit: gateware, but the camera's board is {board}, which loads none")
+        );
+    }
+    edit(&release, |manifest| manifest["files"] = serde_json::json!([]));
+    let line = refusal(&release, &identity(|_| {}));
+    assert!(line.contains("the release has no files, expected firmware or gateware"), "{line}");
 }
 
 #[test]

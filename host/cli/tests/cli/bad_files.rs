@@ -230,7 +230,8 @@ fn a_pipe_or_a_device_is_refused_and_not_waited_for() {
     for weights in ["pipe.safetensors", "/dev/zero"] {
         let upscale = ["upscale", "in.npy", "--backend", "cpu", "--out", "out.npy"];
         let outcome = bench.run(&[&upscale[..], &["--weights", weights]].concat());
-        outcome.failed(1, &[weights, "not a file"]);
+        let outcome = outcome.failed(1, &[weights, "a device or pipe, expected a file"]);
+        assert_eq!(outcome.stderr.matches("expected a file").count(), 1, "{outcome:?}");
     }
 }
 

@@ -41,7 +41,7 @@ fn mistakes_in_a_description_are_told_in_one_line() {
     bench.write("text.toml", b"[leds\n");
     let cases: [(&str, &[&str]); 4] = [
         ("key.toml", &["key.toml", "leds.power", "expected one of", "power_mw"]),
-        ("range.toml", &["leds.power_mw is -4", "0 to 1000"]),
+        ("range.toml", &["leds.power_mw is -4", "0.001 to 1000"]),
         ("text.toml", &["text.toml", "line 1", "expected TOML"]),
         ("none.toml", &["none.toml", "no such file", "paper, fga015, one-metre"]),
     ];

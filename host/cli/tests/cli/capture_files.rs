@@ -29,8 +29,8 @@ fn two_captures_started_at_once_make_two_recordings() {
 #[test]
 fn a_full_disk_is_told_with_the_frames_that_the_file_really_holds() {
     let bench = Bench::new();
-    // 2 MB, and an error in place of the signal that ends a program silently.
-    let limits = "trap '' XFSZ; ulimit -f 4000";
+    // 2 MB. The signal of the limit, which ends a program silently, is an error here.
+    let limits = "ulimit -f 4000";
     let capture = ["capture", "--frames", "3000", "--no-calibration", "--adc-latency", "6"];
     let outcome = bench.run_limited(limits, &[&capture[..], &["--out", "rec.mcap"]].concat());
     let outcome = outcome.failed(1, &["rec.mcap: cannot record any more", "File too large"]);
@@ -40,6 +40,56 @@ fn a_full_disk_is_told_with_the_frames_that_the_file_really_holds() {
     let report = bench.run(&again).succeeded().json();
     assert_eq!(report["frames"]["received"], told, "{}: {report}", outcome.stderr);
     assert!(told > 100, "{told}");
+    // A script learns the account of the run all the same.
+    let json = [&capture[..], &["--out", "again.mcap", "--json"]].concat();
+    let report = bench.run_limited(limits, &json).failed(1, &["again.mcap"]).json();
+    assert_eq!((&report["complete"], &report["recording"]), (&false.into(), &"again.mcap".into()));
+    assert!(report["missing"].as_str().unwrap().contains("File too large"), "{report}");
+    assert!(report["frames"]["received"].as_u64().unwrap() > 100, "{report}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_export_on_a_full_disk_is_one_line_and_leaves_nothing() {
+    let bench = Bench::new();
+    bench.run(&["capture", "--frames", "40", "--out", "rec.mcap"]).succeeded();
+    for format in ["npz", "npy", "mcap", "apng"] {
+        let out = format!("x.{format}");
+        let export = ["export", "rec.mcap", "--to", format, "--out", &out];
+        // 4 kB
+        bench.run_limited("ulimit -f 8", &export).failed(1, &[&out, "File too large"]);
+        assert_eq!(bench.names(), ["rec.mcap"], "{format}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_closes_the_pipe_ends_no_recording() {
+    let bench = Bench::new();
+    let out = bench.path("rec.mcap");
+    let mut capture = std::process::Command::new(crate::bench::program())
+        .args(["capture", "--frames", "200", "--json", "--out"])
+        .arg(&out)
+        .env("XDG_DATA_HOME", bench.path("data"))
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop((capture.stdout.take(), capture.stderr.take()));
+    assert!(capture.wait().unwrap().success());
+    let report = bench.run(&["info", "rec.mcap", "--json"]).succeeded().json();
+    assert_eq!(report["frames"]["received"], 200, "{report}");
+    // The usual code, also if the output is closed at once.
+    let mut info = std::process::Command::new(crate::bench::program())
+        .args(["info", "--json"])
+        .arg(&out)
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(info.stdout.take());
+    let ended = info.wait_with_output().unwrap();
+    assert!(ended.status.success() && ended.stderr.is_empty(), "{ended:?}");
 }
 
 #[cfg(unix)]

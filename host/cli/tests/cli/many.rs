@@ -91,3 +91,21 @@ fn what_belongs_to_a_single_file_is_refused() {
     );
     assert_eq!(bench.names(), ["empty", "in"]);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_name_that_is_no_utf_8_costs_its_own_image_alone() {
+    use std::os::unix::ffi::OsStrExt;
+    let bench = folder_of(2, 8);
+    let odd = bench.path("in").join(std::ffi::OsStr::from_bytes(b"0000\xff.npz"));
+    std::fs::write(odd, Measured::new(8).npz()).unwrap();
+    let outcome = bench.run(&["reconstruct", "in", "--out", "out"]);
+    assert!(outcome.stdout.contains("2 images of 8 x 8 of 3 files"), "{outcome:?}");
+    assert!(
+        outcome.stdout.contains("skipped: in/0000\u{fffd}.npz: found a name that is no UTF-8"),
+        "{outcome:?}"
+    );
+    outcome.failed(1, &["1 of 3 files gave no image"]);
+    let skipped = &bench.json("out/report.json")["skipped"];
+    assert_eq!(skipped[0]["file"], "in/0000\u{fffd}.npz", "{skipped}");
+}

@@ -18,7 +18,7 @@ const BASIS: &str = "basis";
 /// The range of each number: key, minimum, maximum. Units are in the keys.
 pub(super) const RANGES: &[(&str, f64, f64)] = &[
     ("wavelength_nm", 400.0, 1700.0),
-    ("leds.power_mw", 0.0, 1000.0),
+    ("leds.power_mw", 0.001, 1000.0),
     ("leds.spectrum_fwhm_nm", 0.1, 1000.0),
     ("leds.half_angle_deg", 0.1, 60.0),
     ("leds.edge_ns", 0.0, 10_000.0),

@@ -120,5 +120,5 @@ def count(value: Any, name: str, *, least: int = 0) -> int | None:
     except (TypeError, ValueError, OverflowError):
         raise Error(f"{name} is {value!r}, expected a whole number") from None
     if number != value or number < least or number > 2**32 - 1:
-        raise Error(f"{name} is {value}, expected a whole number of at least {least}")
+        raise Error(f"{name} is {value}, expected a whole number from {least} to {2**32 - 1}")
     return number

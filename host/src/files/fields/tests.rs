@@ -108,3 +108,44 @@ fn a_matrix_without_numbers_is_read_whatever_its_shape() {
         assert_eq!(field, Field { shape, real: Vec::new(), imaginary: Some(Vec::new()) });
     }
 }
+
+/// h5py refuses such a file too, by the end-of-file address. Arrays before the cut could be read.
+#[cfg(feature = "hdf5")]
+#[test]
+fn an_hdf5_file_that_was_cut_is_refused_wherever_it_was_cut() {
+    for (name, bytes) in [
+        ("h5py.h5", &include_bytes!("../small/h5py.h5")[..]),
+        ("level73.mat", include_bytes!("../small/level73.mat")),
+        ("claims.h5", include_bytes!("../small/claims.h5")),
+    ] {
+        let whole = bytes.len();
+        // After the superblock, which tells the length.
+        for length in (whole / 2..whole).step_by(97).chain([whole - 1]) {
+            let (_folder, path) = file(name, &bytes[..length]);
+            let told = line(&Fields::open(&path, false).err().unwrap(), name);
+            let lengths = format!("({length} bytes, {whole} by its superblock)");
+            assert!(told.contains("damaged or cut short") && told.contains(&lengths), "{told}");
+        }
+        // What follows a whole file is no damage.
+        let (_folder, path) = file(name, &[bytes, b"more"].concat());
+        Fields::open(&path, false).unwrap();
+    }
+}
+
+#[test]
+fn a_matlab_file_of_level_4_is_named_with_the_way_out() {
+    // `y`, 1 x 2 in float64, as SciPy's savemat(..., format="4") writes it, and as an old machine with the high byte first.
+    let little = [0_u32, 1, 2, 0, 2].map(u32::to_le_bytes).concat();
+    let big = [1000_u32, 1, 2, 0, 2].map(u32::to_be_bytes).concat();
+    for head in [little, big] {
+        let (_folder, path) = file("old.mat", &[&head[..], b"y\0", &[0; 16]].concat());
+        let told = line(&Fields::open(&path, false).err().unwrap(), "old.mat");
+        assert!(told.contains("a MATLAB file of level 4") && told.contains("-v7"), "{told}");
+    }
+    let (_folder, path) = file(
+        "other.mat",
+        &[[9_u32, 1, 2, 0, 2].map(u32::to_le_bytes).concat(), vec![0; 18]].concat(),
+    );
+    let told = line(&Fields::open(&path, false).err().unwrap(), "other.mat");
+    assert!(!told.contains("level 4"), "{told}");
+}

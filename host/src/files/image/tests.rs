@@ -254,7 +254,32 @@ fn a_picture_of_a_palette_that_would_take_too_much_memory_is_refused_before_it_t
         line(&read(&bytes).unwrap_err(), "scene.png")
     };
     let told = of_edge(16_384);
-    assert!(told.contains("too large") && told.contains("512 MiB when decoded"), "{told}");
+    assert!(told.contains("too large (16384 x 16384 pixels)"), "{told}");
+    assert!(told.contains("512 MiB in memory, decoded and as grey levels"), "{told}");
     let told = of_edge(16);
     assert!(!told.contains("too large"), "{told}");
+}
+
+/// A header of 16384 x 16384 pixels of one bit took 1.3 GB to be told that it is not 64 x 64.
+#[test]
+fn a_picture_of_another_size_is_refused_before_its_pixels_are_decoded() {
+    let headed = |width: u32, height: u32| {
+        let mut bytes = Vec::new();
+        let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
+        encoder.set_depth(::png::BitDepth::One);
+        let mut writer = encoder.write_header().unwrap();
+        // The pixels are missing, which the decoder would tell.
+        writer.write_chunk(::png::chunk::IDAT, &[]).unwrap();
+        drop(writer);
+        bytes
+    };
+    for (width, height) in [(65, 64), (64, 65), (8192, 8192)] {
+        let (_folder, path) = file("in.png", &headed(width, height));
+        let told = crate::files::stack::ImageStack::read(&path, 64, false).unwrap_err().to_string();
+        let expected = format!("images of {height} x {width} pixels, expected 64 x 64");
+        assert!(told.contains(&expected), "{told}");
+    }
+    let (_folder, path) = file("in.png", &headed(64, 64));
+    let told = crate::files::stack::ImageStack::read(&path, 64, false).unwrap_err().to_string();
+    assert!(told.contains("damaged or cut short"), "{told}");
 }
