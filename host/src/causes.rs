@@ -37,6 +37,8 @@ fn with_short_numbers(line: &str) -> String {
     while let Some(start) = rest.find(|c: char| c.is_ascii_digit()) {
         let (before, number) = rest.split_at(start);
         let end = number.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(number.len());
+        // A full stop after a number ends the sentence.
+        let end = number[..end].trim_end_matches('.').len();
         let (number, after) = number.split_at(end);
         short.push_str(before);
         match number.parse::<f64>() {

@@ -67,7 +67,8 @@ mod tests {
         std::fs::write(&path, "[leds]\npower_mw = -2").unwrap();
         let error = read_camera_model(path.to_str().unwrap()).unwrap_err().to_string();
         assert!(
-            error.ends_with("lab.toml: leds.power_mw is -2.0, expected a number from 0 to 1000"),
+            error
+                .ends_with("lab.toml: leds.power_mw is -2.0, expected a number from 0.001 to 1000"),
             "{error}"
         );
         let error = read_camera_model("one-meter").unwrap_err().to_string();

@@ -183,7 +183,8 @@ impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {
         let value = self.model.read(address)?;
         let Some(run) = &self.run else { return Ok(value) };
         Ok(match Register::at(address) {
-            Some(Register::FramesMade) => run.sequence,
+            // The offered frame is made.
+            Some(Register::FramesMade) => run.sequence + u32::from(run.offers()),
             Some(Register::FramesLost) => 0,
             Some(register) if run.offers() && MEASURES.contains(&register) => {
                 let measures = MEASURES.into_iter().zip(run.computed[run.slot()].measures);
@@ -279,6 +280,7 @@ mod tests {
             assert_eq!(again.head.device_time_us, u64::from(number) * 40 / 125);
             fpga.write(Register::Control.address(), control::RELEASE).unwrap();
         }
-        assert_eq!(fpga.read(Register::FramesMade.address()).unwrap(), 5);
+        // With the frame that is offered.
+        assert_eq!(fpga.read(Register::FramesMade.address()).unwrap(), 6);
     }
 }

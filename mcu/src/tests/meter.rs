@@ -64,7 +64,7 @@ impl Bench {
             payload.extend(i32::try_from(sums.difference()).unwrap().to_le_bytes());
         }
         let mut room = [0; MAX_DEVICE_PACKET];
-        let packet = &*seal(&payload, &mut room).unwrap();
+        let packet = seal(&payload, &mut room).unwrap();
         let mut bus = FakeFpga::default();
         bus.deliver(packet.to_vec(), (level, over_range));
         self.meter.look(Micros(now), (packet, PATTERNS), &mut self.scratch, &mut bus);

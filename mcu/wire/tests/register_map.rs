@@ -140,7 +140,7 @@ fn bits_codes_and_limits_are_these() {
     for bit in [clocks::LOCKED, clocks::ALIVE, clocks::READY] {
         assert!(!clocks::fit(12_500 | good & !bit) && !clocks::fit(12_500 | bit), "{bit:#x}");
     }
-    let fits = [0x0000_0200, 0x0000_0300, 0x0000_0303, 0x0000_0400, 0x0001_0300]
+    let fits = [0x0000_0300, 0x0000_0400, 0x0000_0403, 0x0000_0500, 0x0001_0400]
         .map(register::has_this_map);
     assert_eq!(fits, [false, true, true, false, false]);
     let fields = [sampling::PHASE, sampling::WIDTH, sampling::PERIOD, sampling::DONE];

@@ -287,14 +287,14 @@ fn a_camera_that_sends_more_than_was_asked_for_is_stopped() {
 #[test]
 fn nothing_but_damaged_packets_neither_succeeds_nor_fills_the_disk() {
     let run = Run { frames: 0, says: None, flood: Some(Flood::Damaged), ..HONEST };
-    let report = incomplete(run, 0, &["67 MB of damaged packets and packets of other runs"]);
+    let report = incomplete(run, 0, &["66 MB of damaged packets and packets of other runs"]);
     assert!(report["made"].is_null() && report["damaged_packets"].as_u64().unwrap() > 1000);
 }
 
 #[test]
 fn nothing_but_frames_of_another_run_neither_succeeds_nor_fills_the_disk() {
     let run = Run { frames: 2, says: None, flood: Some(Flood::OfAnotherRun), ..HONEST };
-    incomplete(run, 2, &["67 MB of damaged packets and packets of other runs came with 2 frames"]);
+    incomplete(run, 2, &["66 MB of damaged packets and packets of other runs came with 2 frames"]);
 }
 
 #[test]

@@ -124,9 +124,7 @@ fn a_folder_of_pictures_becomes_a_folder_of_the_same_names() {
     std::fs::copy(bench.path("sharp.picture.png"), bench.path("in/sharp.picture.png")).unwrap();
     bench.run(&["deblur", "in", "--out", "sharper"]).succeeded();
     bench.write("in/c.png", &encode_grey(32, 32, &bar(32), &provenance()));
-    bench
-        .run(&["deblur", "in", "--out", "again"])
-        .failed(1, &["c.png", "32 x 32", "64 x 64", "a.png"]);
+    bench.run(&["deblur", "in", "--out", "again"]).failed(1, &["c.png", "32 x 32", "64 x 64"]);
     assert!(!bench.path("again").exists());
 }
 

@@ -376,7 +376,7 @@ impl World {
             Err(format!("light in {:?}", camera.state()))
         } else if machine.fault.is_some() {
             Err(format!("light with {:?}", machine.fault))
-        } else if !matches!(machine.session, Session::Open { .. }) {
+        } else if !matches!(machine.session, Session::Open) {
             Err("light without a session".into())
         } else if silence > machine.limits.host_silence {
             Err(format!("light after {} us without a command", silence.0))
