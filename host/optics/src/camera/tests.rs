@@ -65,7 +65,10 @@ fn mistakes_are_named_with_key_found_and_expected() {
         ("[leds]\npower = 4", "found leds.power, expected one of dead, edge_ns, half_angle_deg"),
         ("[led]\npower_mw = 4", "found led, expected one of adc, amplifier"),
         ("[leds]\npower_mw = -1", "leds.power_mw is -1.0, expected a number from 0.001 to 1000"),
-        ("[leds]\npower_mw = \"4\"", "leds.power_mw is \"4\", expected a number from 0.001 to 1000"),
+        (
+            "[leds]\npower_mw = \"4\"",
+            "leds.power_mw is \"4\", expected a number from 0.001 to 1000",
+        ),
         ("[leds]\npower_mw = nan", "leds.power_mw is nan, expected a number from 0.001 to 1000"),
         ("leds = 4", "leds is 4, expected a section [leds]"),
         (

@@ -1,10 +1,9 @@
 //! A tap that records what an FPGA gives its firmware.
 //!
-//! A tap changes nothing, except the clock of a start and the version of the gateware where a test asks for that.
+//! A tap changes nothing.
 
 use nirspi::virtual_camera::SimulatedFpga;
 use nirspi_mcu::{BusError, FpgaBus};
-use nirspi_wire::register::{Register, control};
 use std::sync::{Arc, Mutex};
 
 /// Bytes of each frame and burst, in order of arrival.
@@ -21,27 +20,12 @@ impl Log {
 pub struct Tap<F> {
     fpga: F,
     log: Log,
-    start_at: Option<u64>,
-    is_older: bool,
 }
-
-/// Gateware that makes no packets.
-const OLDER: u32 = 0x0000_0300;
 
 impl<F: SimulatedFpga> Tap<F> {
     pub fn new(fpga: F) -> (Self, Log) {
         let log = Log::default();
-        (Self { fpga, log: log.clone(), start_at: None, is_older: false }, log)
-    }
-
-    /// Delays starts to this clock: firmware behind another bus starts at another time.
-    pub fn starting_at(self, clock: u64) -> Self {
-        Self { start_at: Some(clock), ..self }
-    }
-
-    /// Says that the gateware is of a version that makes no packets.
-    pub fn older(self) -> Self {
-        Self { is_older: true, ..self }
+        (Self { fpga, log: log.clone() }, log)
     }
 
     /// Records new bytes once. The bus gives the same bytes again until their release.
@@ -57,17 +41,10 @@ impl<F: SimulatedFpga> Tap<F> {
 
 impl<F: SimulatedFpga> FpgaBus for Tap<F> {
     fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        match self.fpga.read(address)? {
-            _ if self.is_older && address == Register::Version.address() => Ok(OLDER),
-            value => Ok(value),
-        }
+        self.fpga.read(address)
     }
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
-        let starts = address == Register::Control.address() && value & control::START != 0;
-        if let Some(clock) = self.start_at.filter(|_| starts) {
-            self.fpga.advance(u32::try_from(clock - self.fpga.clock()).unwrap());
-        }
         self.fpga.write(address, value)
     }
 
