@@ -6,7 +6,6 @@ use crate::{Board, FpgaPort};
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
 use nirspi_mcu::{BusError, GatewareLoader, HostPort, Inputs, Lamps, LoadError, Micros, Ring};
-use nirspi_wire::fpga::{Header, Sums};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
 use nirspi_wire::register::{IDENTITY, Register, control, mode, status};
@@ -66,8 +65,6 @@ pub fn advance(micros: u64) {
 
 /// The board's pins, as a test reads and sets them.
 pub struct Pins {
-    /// The gateware's version.
-    pub version: Cell<u32>,
     /// The pin that enables the LED drivers.
     pub leds_enabled: Cell<bool>,
     /// The lamps that people see.

@@ -10,7 +10,6 @@ use embassy_futures::poll_once;
 use nirspi_mcu::{Crash, Lamps, Limits, PacketSink};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
-use nirspi_wire::register::Register;
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Reply, RunLength, open, version,
 };
