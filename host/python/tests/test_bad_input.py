@@ -54,7 +54,10 @@ REFUSED = [
     (lambda: ns.Measurement(y=[np.nan, 2], rows=[0], n=8), "no pattern that was read"),
     (lambda: ns.Measurement(y=[1j, 2], rows=[0], n=8), "expected real readings"),
     (lambda: ns.Measurement(y=[1, 2], rows=[0], n=8, readings="triples"), "readings is 'triples'"),
-    (lambda: ns.Measurement(d=np.zeros((0, 2)), rows=[0, 1], n=8).take(0), "count is 0, expected a whole number from 1"),
+    (
+        lambda: ns.Measurement(d=np.zeros((0, 2)), rows=[0, 1], n=8).take(0),
+        "count is 0, expected a whole number from 1",
+    ),
     (lambda: ns.reconstruct(np.zeros(64)), "found ndarray, expected a Measurement"),
     (lambda: ns.reconstruct(GOOD, method="magic"), "unknown method"),
     (lambda: ns.reconstruct(GOOD, basis="fourier"), "unknown basis"),
@@ -64,7 +67,10 @@ REFUSED = [
     (lambda: ns.reconstruct(GOOD, order="spiral"), "unknown order"),
     (lambda: ns.reconstruct(GOOD, sparsity=4), "sparsity belongs to omp"),
     (lambda: ns.reconstruct(GOOD, method="omp", sparsity=0), "at least 1"),
-    (lambda: ns.reconstruct(GOOD, method="omp", sparsity=-1), "sparsity is -1, expected a whole number from 0"),
+    (
+        lambda: ns.reconstruct(GOOD, method="omp", sparsity=-1),
+        "sparsity is -1, expected a whole number from 0",
+    ),
     (lambda: ns.reconstruct(GOOD, method="omp", residual=2.0), "residual is 2, expected 0 or more"),
     (lambda: ns.reconstruct(GOOD, method="tv", strength=-1.0), "strength is -1"),
     (lambda: ns.reconstruct(GOOD, method="omp", non_negative=True), "pixel basis"),
