@@ -8,7 +8,7 @@
 #
 #   correctness    tests of every kernel, GPU against processor on whole images, compute-sanitizer
 #   speed          OMP, networks and pipeline; the same in PyTorch, and batched-omp
-#   profile        nsys and ncu of the networks, PyTorch with torch.compile
+#   profile        time of each kernel of the networks (ncu), PyTorch with torch.compile
 #
 # OUT/ has a file for each step. A step that fails or is missing says so, and the next one goes on; the last lines, in
 # OUT/summary.txt too, have each step and its result. `run` ends with 1 if a step of `correctness` failed.
@@ -17,8 +17,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/../../.."
 
-# Largest size of .gpu/ in MiB: what is carried to the other machine at once.
-limit=64
+# Largest size of .gpu/ in MiB: with the repository, 64 MiB are carried to the other machine at once.
+limit=32
 
 pack() {
     local target=${CARGO_TARGET_DIR:-target}
@@ -35,7 +35,9 @@ pack() {
         strip -o ".gpu/tests-$crate" "$built"
     done
     rm .gpu/log
-    xz -T0 -f .gpu/nirspi .gpu/tests-recon .gpu/tests-nets
+    # One archive with one dictionary: the three programs hold the same weights.
+    tar -C .gpu -c nirspi tests-recon tests-nets | xz --lzma2=preset=9,dict=128MiB >.gpu/programs.tar.xz
+    rm .gpu/nirspi .gpu/tests-recon .gpu/tests-nets
     # As it is: pip would build it, and its compiled helpers are for another variant than ours.
     python3 - <<'END' || echo "skipped: no batched-omp from PyPI, peers.py will say so"
 import re, urllib.request
@@ -52,8 +54,8 @@ END
     fi
 }
 
-# Seconds of a part.
-part_s=400
+# Seconds of a part; PART_S in the environment changes them.
+part_s=${PART_S:-400}
 
 # left SECONDS NAME: the seconds that a step may take, no more than its part has left; else a line about the step.
 left() {
@@ -204,21 +206,12 @@ speed() {
 profile() {
     local precision
     for precision in f32 f16; do
-        local what=("$work/nirspi" bench enhance --frames 256 --repeats 3 --backend cuda --no-consistency --precision "$precision")
-        if needs nsys "nsys-$precision"; then
-            # Time of each kernel in the whole, and of copies.
-            lines=60 step "nsys-$precision" 60 nsys profile --trace cuda --stats true --force-overwrite true \
-                --output "$out/nsys-$precision" "${what[@]}" || true
-        fi
-        if needs ncu "ncu-$precision"; then
-            # Two passes of the UNet after the comparison with the plain kernels. The clock is left as it is.
-            step "ncu-$precision" 120 ncu --clock-control none --set full --kernel-name 'regex:^convolve' \
-                --launch-skip 100 --launch-count 30 --force-overwrite --export "$out/ncu-$precision" "${what[@]}" || true
-            if [ -f "$out/ncu-$precision.ncu-rep" ]; then
-                ncu --import "$out/ncu-$precision.ncu-rep" --csv --page raw --metrics "$(metrics)" \
-                    >"$out/ncu-$precision.csv" 2>&1 || true
-                head -n 40 "$out/ncu-$precision.csv"
-            fi
+        local what=("$work/nirspi" bench enhance --frames 256 --repeats 1 --backend cuda --no-consistency --precision "$precision")
+        if needs ncu "ncu-$precision" && needs python3 "kernels-$precision"; then
+            # Every kernel, those of the comparison with the plain ones too. The clock is left as it is.
+            step "ncu-$precision" 150 ncu --clock-control none --metrics "$(metrics)" --csv --page raw \
+                --log-file "$out/ncu-$precision.csv" "${what[@]}" || true
+            lines=60 step "kernels-$precision" 10 python3 host/gpu/benches/kernels.py "$out/ncu-$precision.csv" || true
         fi
     done
     if needs python3 peer; then
@@ -227,19 +220,13 @@ profile() {
     fi
 }
 
-# Time; share of the time in which the tensor cores and the f32 units work; conflicts of banks; traffic of cache and memory;
-# warps; local memory, which is that of spilled registers.
+# Time, share of the time in which the f32 units work, warps, registers: names that ncu 2025.3 knows for an H100.
 metrics() {
     local all=(
         gpu__time_duration.sum
-        sm__inst_executed_pipe_tensor.avg.pct_of_peak_sustained_active
         sm__inst_executed_pipe_fma.avg.pct_of_peak_sustained_active
-        l1tex__data_bank_conflicts_pipe_lsu.sum
-        lts__t_bytes.avg.pct_of_peak_sustained_elapsed
-        dram__bytes.avg.pct_of_peak_sustained_elapsed
         sm__warps_active.avg.pct_of_peak_sustained_active
         launch__registers_per_thread
-        smsp__inst_executed_op_local.sum
     )
     local IFS=,
     echo "${all[*]}"
@@ -254,10 +241,7 @@ run() {
     : >"$out/summary.txt"
     work=$(mktemp -d)
     trap 'rm -rf "$work"' EXIT
-    for program in nirspi tests-recon tests-nets; do
-        xz -dc ".gpu/$program.xz" >"$work/$program"
-        chmod +x "$work/$program"
-    done
+    tar -xJf .gpu/programs.tar.xz -C "$work"
     # NVRTC is looked for by name: CUDA's own folder is seldom among those searched.
     export LD_LIBRARY_PATH=${CUDA_PATH:-/usr/local/cuda}/lib64${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
     export PATH=$PATH:${CUDA_PATH:-/usr/local/cuda}/bin

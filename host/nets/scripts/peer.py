@@ -22,7 +22,8 @@ import torch.nn.functional as F
 from safetensors.torch import load_file
 
 NETS = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(NETS / "training"))
+# The networks alone: the package around them is built with Rust, which the machine with the GPU has not.
+sys.path.insert(0, str(NETS.parent / "python/python/nirspi/train"))
 from networks import FSRCNN, Estimator, UNet  # noqa: E402
 
 

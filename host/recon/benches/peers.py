@@ -90,14 +90,19 @@ def cosines_by_hadamard_rows(rng, m, n):
 
 class Nirspi:
     def __init__(self, binary, options, d, y, k, folder, repeats=15):
-        self.path, self.out = os.path.join(folder, "problem.npz"), os.path.join(folder, "solution.npz")
+        # A solution of its own for each program: `bench omp` replaces no file.
+        self.path, self.out = os.path.join(folder, "problem.npz"), os.path.join(folder, f"{'-'.join(options)}solution.npz")
         np.savez(self.path, D=d, Y=y, k=k)
         self.command = [binary, "bench", "omp", "--input", self.path, "--out", self.out,
                         "--repeats", str(repeats), *options]
         self.prepare = []
 
     def __call__(self):
-        report = json.loads(subprocess.run(self.command, check=True, capture_output=True).stdout)
+        Path(self.out).unlink(missing_ok=True)
+        ran = subprocess.run(self.command, capture_output=True, text=True)
+        if ran.returncode:
+            raise RuntimeError(ran.stderr.strip())
+        report = json.loads(ran.stdout)
         self.prepare.append(report["prepare_ms"])
         with np.load(self.out) as solution:
             self.support = solution["support"]
