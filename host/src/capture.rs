@@ -10,26 +10,32 @@
 //! (`missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). The frames that a camera
 //! delivers limit what this program writes (`junk::tests`).
 
+mod flat_field;
 mod frames_due;
 mod junk;
 mod missing;
+mod policy;
 #[cfg(feature = "pictures")]
 mod preview;
 mod report;
 mod run;
 
+pub use flat_field::{FlatFieldError, measure_dark, measure_flat_field};
+pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};
 #[cfg(feature = "pictures")]
 pub use preview::Preview;
 pub use report::CaptureReport;
 pub use run::Run;
 
 use crate::account::{FailedChecks, LossCounters};
-use crate::calibration::{CalibrationError, Settling};
+use crate::calibration::CalibrationError;
 use crate::clock::Instant;
 use crate::files::interrupt::Signal;
+use crate::identity::CameraIdentity;
 use crate::integrate::Integrated;
 use crate::recording::Target;
-use crate::session::{CameraIdentity, Session, SessionError};
+use crate::response::Settling;
+use crate::session::{Session, SessionError};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, Fault, Frame, Status};
 use std::io;

@@ -38,6 +38,13 @@ pub(crate) fn calendar(unix_s: u64) -> [u64; 6] {
     [year, month, day, seconds / 3600, seconds / 60 % 60, seconds % 60]
 }
 
+/// A moment as `2026-11-20 08:30 UTC`.
+#[must_use]
+pub fn date(unix_s: u64) -> String {
+    let [year, month, day, hour, minute, _] = calendar(unix_s);
+    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
 /// A moment in UTC as RFC 3339 writes it: `2026-11-25T08:30:00Z`.
 #[must_use]
 pub fn rfc3339(unix_s: u64) -> String {
@@ -115,5 +122,18 @@ mod tests {
     fn a_moment_is_written_as_rfc_3339_says() {
         assert_eq!(rfc3339(0), "1970-01-01T00:00:00Z");
         assert_eq!(rfc3339(1_709_251_199), "2024-02-29T23:59:59Z");
+    }
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for (unix_s, expected) in [
+            (0, "1970-01-01 00:00 UTC"),
+            (951_827_696, "2000-02-29 12:34 UTC"),
+            (1_709_251_199, "2024-02-29 23:59 UTC"),
+            (1_709_251_200, "2024-03-01 00:00 UTC"),
+            (4_107_542_400, "2100-03-01 00:00 UTC"),
+        ] {
+            assert_eq!(date(unix_s), expected);
+        }
     }
 }

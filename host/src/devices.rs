@@ -1,13 +1,14 @@
 //! The cameras that can be used from this machine.
 
+use crate::address::CameraAddress;
 use crate::causes::in_one_line;
+use crate::identity::CameraIdentity;
 use crate::link::usb::{self, UsbCamera, identify::check_version};
-use crate::link::{CameraAddress, TcpLink, serial_ports};
-use crate::session::{CameraIdentity, Session, SessionError};
+use crate::link::{TcpLink, serial_ports};
+use crate::session::{Session, SessionError};
 use serde::Serialize;
-use std::fmt;
-use std::io;
 use std::path::PathBuf;
+use std::{fmt, io};
 use thiserror::Error;
 
 /// Default address of `nirspi virtual`.

@@ -239,21 +239,12 @@ impl Fpga {
     }
 }
 
-/// What gateware is built for, in words.
-#[must_use]
-pub fn design_in_words(design: Design) -> &'static str {
-    match design {
-        Design::Camera => "camera",
-        Design::BringUp => "bring-up without ADC: samples are made of the levels of the LED lines",
-    }
-}
-
 impl fmt::Display for Fpga {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.check() {
             Ok(design) => {
                 let clock = clock_in_words(self.clocks.unwrap_or_default());
-                write!(f, "FPGA: {}; ADC clock {clock}", design_in_words(design))
+                write!(f, "FPGA: {design}; ADC clock {clock}")
             }
             Err(problem) => write!(f, "{problem}"),
         }

@@ -2,7 +2,8 @@
 //! connected.
 
 use crate::fpga::Fpga;
-use crate::session::{CameraIdentity, Session, SessionError};
+use crate::identity::CameraIdentity;
+use crate::session::{Session, SessionError};
 use crate::signal::Signal;
 use crate::versions::{Part, compare};
 use nirspi_wire::Status;

@@ -3,7 +3,7 @@
 
 mod spread;
 
-use crate::calibration::Settling;
+use crate::response::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{LeakError, MeasurementError, Measurements, Sweep};
 use nirspi_wire::{Frame, FrameFlags};

@@ -3,34 +3,36 @@
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
-//! * [`link`] moves bytes, [`session`] exchanges commands with a camera, [`account`] counts every
-//!   frame,
-//! * [`devices`] lists cameras, [`mod@info`] asks one of them who it is,
-//! * [`about`] says what a build contains, [`versions`] checks whether camera and program fit
-//!   together, [`events`] words a camera's reports,
-//! * [`fpga`] says in words what an FPGA answers, [`gateware`] loads a camera's FPGA, [`update`] brings a camera to the versions of a release,
-//! * [`calibration`] measures, keeps and chooses latency and settling, [`selftest`] checks a
-//!   camera,
-//! * [`capture`] runs a measurement, [`recording`] stores it, [`export`] writes it for other
-//!   programs, [`replay`] plays it back as a camera,
-//! * [`frame_time`] gives the frames of a camera times by this computer's clock,
-//! * [`tally`] and [`integrate`] make measurements of frames; `nirspi-recon` reconstructs an image
-//!   from measurements,
-//! * [`source`] reads measurements from a file, a recording or a capture,
-//! * [`reconstruct`] makes an image or many of what was read,
-//! * [`files`], [`picture`] and [`scene`] read and write what users see, [`resolution`] measures
-//!   the finest detail, [`legibility`] reads characters,
-//! * [`imaging`] scales, enhances and judges images, and gives warnings,
-//! * [`serve`] shows a camera live on a web page,
-//! * [`provenance`] says where readings come from and what made a file of them,
-//! * [`causes`] prints an error with its causes, [`clock`] says the time, [`heartbeat`] gives signs of life of long work, [`stage_times`]
-//!   measures it,
-//! * [`training`] makes pairs for training networks, with the virtual camera,
-//! * [`udev`] gives users access to cameras on USB; [`boards`] lists the boards with firmware; with
-//!   the feature `flash`, `flash` programs the boards,
-//! * [`example`] makes example measurements, [`safety_case`] says what eye and skin receive and what each fault leaves lit,
-//! * [`virtual_camera`] is a camera without hardware: optics simulator, gateware model, real
-//!   firmware logic.
+//! Each line uses the lines above it, and no two modules use each other:
+//!
+//! * [`clock`] says the time, [`causes`] prints an error with its causes, [`heartbeat`] gives signs of
+//!   life of long work, [`stage_times`] measures it, [`boards`] lists the boards with firmware, [`about`]
+//!   says what a build contains,
+//! * [`identity`] says who a camera is, [`provenance`] where readings come from and what made a file of
+//!   them, [`files`] reads and writes what users see,
+//! * [`link`] moves bytes, [`session`] exchanges commands with a camera, [`events`] words its reports,
+//!   [`versions`] checks whether camera and program fit together, [`fpga`] says in words what an FPGA
+//!   answers, [`mod@info`] asks a camera who it is,
+//! * [`setup`] is what a camera shows and sums, [`exposure`] how long it looks, [`response`] how it
+//!   answers a step of light,
+//! * [`account`] counts every frame, [`integrate`] and [`tally`] make measurements of frames,
+//!   [`frame_time`] gives the frames of a camera times by this computer's clock,
+//! * [`calibration`] measures and keeps latency, settling and flat field, [`selftest`] makes each
+//!   [`check`] of a camera,
+//! * [`recording`] stores a measurement, [`replay`] plays it back as a camera, [`capture`] runs a
+//!   measurement and chooses its calibration, [`export`] writes it for other programs,
+//! * [`address`] opens the camera at an address, [`devices`] lists cameras, [`gateware`] loads a camera's
+//!   FPGA, [`update`] brings a camera to the versions of a release, [`udev`] gives users access to cameras
+//!   on USB; with the feature `flash`, `flash` programs the boards,
+//! * [`picture`] draws, [`scene`] is what a camera looks at, [`resolution`] measures the finest detail,
+//!   [`legibility`] reads characters,
+//! * [`source`] reads measurements from a file, a recording or a capture, `nirspi-recon` reconstructs
+//!   images, [`imaging`] scales, enhances and judges them and gives warnings, [`reconstruct`] makes an
+//!   image or many of what was read,
+//! * [`virtual_camera`] is a camera without hardware: optics simulator, gateware model, real firmware
+//!   logic; [`example`] makes example measurements, [`training`] pairs for training networks,
+//!   [`safety_case`] says what eye and skin receive and what each fault leaves lit,
+//! * [`serve`] shows a camera live on a web page.
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and
 //! reads measurements, without web server, typefaces, optics or networks. The features `enhance`,
@@ -44,10 +46,13 @@
 
 pub mod about;
 pub mod account;
+#[cfg(not(target_family = "wasm"))]
+pub mod address;
 pub mod boards;
 pub mod calibration;
 pub mod capture;
 pub mod causes;
+pub mod check;
 pub mod clock;
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 mod depth_image;
@@ -66,6 +71,7 @@ pub mod fpga;
 pub mod frame_time;
 pub mod gateware;
 pub mod heartbeat;
+pub mod identity;
 pub mod imaging;
 pub mod info;
 pub mod integrate;
@@ -80,6 +86,7 @@ pub mod reconstruct;
 pub mod recording;
 pub mod replay;
 pub mod resolution;
+pub mod response;
 #[cfg(feature = "virtual-camera")]
 pub mod safety_case;
 #[cfg(feature = "pictures")]

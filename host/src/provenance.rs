@@ -8,9 +8,8 @@
 //! # Invariant
 //! No secret of the command line is written (`tests::secrets_of_the_command_line_are_left_out`).
 
-use crate::boards;
-use crate::clock;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
+use crate::{boards, clock};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::Path;

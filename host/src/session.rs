@@ -11,74 +11,31 @@ pub mod request;
 pub use error::SessionError;
 pub use request::Request;
 
-use crate::causes::printable;
 use crate::clock::Instant;
 use crate::events;
-use crate::fpga::design_in_words;
+use crate::identity::{CameraIdentity, in_words};
 use crate::link::Link;
-use crate::replay::Recorded;
+use crate::response::Settling;
+use crate::setup::MeasurementSetup;
 use conversation::Conversation;
 use nirspi_wire::register::{Design, Register};
 use nirspi_wire::{
-    Capabilities, Command, DeviceMessage, GatewareChunk, Identity, PacketError, SelfTestReport,
-    Status, version,
+    Capabilities, Command, DeviceMessage, GatewareChunk, PacketError, SelfTestReport, Status,
+    version,
 };
-use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// The longest time in which a camera must answer a command.
 pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// The identity of a camera: the wire's [`Identity`], owned.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CameraIdentity {
-    /// The camera's protocol version.
-    pub protocol: u16,
-    /// Firmware version.
-    pub firmware: String,
-    /// Gateware version.
-    pub gateware: String,
-    /// Board name.
-    pub board: String,
-    /// Serial number.
-    pub serial: String,
-    /// Rate of the ADC.
-    pub adc_hz: u32,
-    /// Resolution of the ADC.
-    pub adc_bits: u8,
-    /// Wavelength of the LEDs.
-    pub wavelength_nm: u16,
-    /// The capabilities of the camera in words; empty for a camera of protocol version 1, which
-    /// does not report capabilities.
-    #[serde(default)]
-    pub capabilities: Vec<String>,
-}
-
-impl From<&Identity<'_>> for CameraIdentity {
-    fn from(identity: &Identity<'_>) -> Self {
-        Self {
-            protocol: identity.protocol,
-            firmware: identity.firmware.to_string(),
-            gateware: identity.gateware.to_string(),
-            board: printable(identity.board),
-            serial: printable(identity.serial),
-            adc_hz: identity.adc_hz,
-            adc_bits: identity.adc_bits,
-            wavelength_nm: identity.wavelength_nm,
-            capabilities: in_words(identity.capabilities),
-        }
-    }
-}
-
-/// The name of each capability; the number of the bit for a capability that this program does not
-/// know.
-fn in_words(capabilities: Capabilities) -> Vec<String> {
-    let bits = (0..u32::BITS).filter(|bit| capabilities.contains(Capabilities(1 << bit)));
-    bits.map(|bit| {
-        let known = Capabilities::NAMES.iter().find(|(known, _)| known.0 == 1 << bit);
-        known.map_or_else(|| format!("capability {bit}"), |(_, name)| (*name).to_owned())
-    })
-    .collect()
+/// What a recording knows of its measurement. A capture of a replay uses this in place of its own
+/// setup and calibration.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    /// The setup of the measurement.
+    pub setup: MeasurementSetup,
+    /// The settling of the camera, if the recording holds it.
+    pub settling: Option<Settling>,
 }
 
 /// Receives every packet of a session.
@@ -171,8 +128,8 @@ impl Session {
                     in_words(wanted).iter().all(|name| identity.capabilities.contains(name))
                 };
                 if can(Capabilities::BRING_UP) {
-                    let what = design_in_words(Design::BringUp);
-                    reports.keep(Some(format!("the camera runs the gateware for {what}")));
+                    let design = Design::BringUp;
+                    reports.keep(Some(format!("the camera runs the gateware for {design}")));
                 }
                 Ok(Self { conversation, identity, reports, recorded: None })
             }

@@ -1,7 +1,7 @@
 //! Checks whether a camera and this program fit together, and says what to update.
 
 use crate::boards::Board;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
 use nirspi_wire::{register::Register, version};
 use serde::Serialize;
 use std::cmp::Ordering;

@@ -2,8 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::calibration::{CalibrationError, Settling};
+use nirspi::calibration::CalibrationError;
 use nirspi::capture::{Calibration, CaptureError, CaptureOptions, capture};
+use nirspi::response::Settling;
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;

@@ -4,10 +4,9 @@
 
 use nirspi::account::LossCounters;
 use nirspi::causes::in_one_line;
-use nirspi::recording::{Recorder, Recording, RunAccount, Target, recover};
-use nirspi::session::CameraIdentity;
+use nirspi::identity::CameraIdentity;
+use nirspi::recording::{Recorder, Recording, RunAccount, Target, recover, tally_recording};
 use nirspi::setup::MeasurementSetup;
-use nirspi::tally::tally_recording;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::samples::{Samples, Width};

@@ -1,8 +1,7 @@
 //! Each frame of an export keeps its own times.
 
 use nirspi::export::{ExportOptions, Format, export};
-use nirspi::recording::Recording;
-use nirspi::tally::hear_recording;
+use nirspi::recording::{Recording, hear_recording};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 

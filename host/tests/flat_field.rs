@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 #![cfg(all(feature = "virtual-camera", feature = "pictures"))]
 
-use nirspi::calibration::{
-    FlatFieldError, Measured, Settling, Sweeps, measure_flat_field, pattern_noise,
-};
+use nirspi::calibration::{Measured, Sweeps, pattern_noise};
+use nirspi::capture::{FlatFieldError, measure_flat_field};
 use nirspi::imaging::score;
+use nirspi::response::Settling;
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
 use nirspi::virtual_camera::{

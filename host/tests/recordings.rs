@@ -2,8 +2,7 @@
 //!
 //! If a test in this file fails, do not change the test or the recordings: somebody's measurements have become unreadable.
 
-use nirspi::recording::Recording;
-use nirspi::tally::tally_recording;
+use nirspi::recording::{Recording, tally_recording};
 use std::path::{Path, PathBuf};
 
 fn recording(name: &str) -> PathBuf {

@@ -2,12 +2,12 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use nirspi::address::CameraAddress;
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
-use nirspi::link::CameraAddress;
-use nirspi::recording::{Recorder, Recording, RunAccount, Target};
-use nirspi::session::{CameraIdentity, Session};
+use nirspi::identity::CameraIdentity;
+use nirspi::recording::{Recorder, Recording, RunAccount, Target, tally_recording};
+use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi::tally::tally_recording;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::samples::{Samples, Width, Words};

@@ -2,8 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use nirspi::check::{Check, Verdict};
 use nirspi::link::{Link, Received};
-use nirspi::selftest::{Check, LinkDemands, SelfTest, Verdict, run};
+use nirspi::selftest::{LinkDemands, SelfTest, run};
 use nirspi::session::Session;
 use nirspi::virtual_camera::{
     MemoryLink, OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics,

@@ -5,11 +5,11 @@
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
 use nirspi::link::Link;
-use nirspi::recording::{Recording, Target};
+use nirspi::recording::{Recording, Target, tally_recording};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::signal::Signal;
-use nirspi::tally::{Tally, tally_recording};
+use nirspi::tally::Tally;
 use nirspi::virtual_camera::{MemoryLink, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::{Order, Rows, Side, fwht, metrics, reconstruct};

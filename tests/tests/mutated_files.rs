@@ -5,19 +5,20 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::calibration::{KeptCalibration, Settling};
+use nirspi::calibration::KeptCalibration;
 use nirspi::capture::{Calibration, CaptureOptions, capture};
 use nirspi::files::measurement::{self, Selection};
 use nirspi::files::order_table::read_order_table;
 use nirspi::files::table::Table;
 use nirspi::files::{image, npy, problem};
 use nirspi::gateware;
-use nirspi::recording::{Recording, Target};
+use nirspi::identity::CameraIdentity;
+use nirspi::recording::{Recording, Target, tally_recording};
+use nirspi::response::Settling;
 use nirspi::serve::settings::Change;
-use nirspi::session::{CameraIdentity, Session};
+use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::source::{Source, SourceOptions};
-use nirspi::tally::tally_recording;
 use nirspi::virtual_camera::{MemoryLink, VirtualOptics, read_camera_model};
 use nirspi_nets::weights::{Array, Precision, Weights};
 use nirspi_optics::{CameraModel, Scene};

@@ -1,18 +1,16 @@
 //! `nirspi calibrate`: measures ADC latency, settling and flat field against a white sheet and
 //! keeps them for the camera.
 
-use super::Usage;
-use super::address;
 use super::camera::{CameraArgs, ModelArgs, SceneArgs, exposure};
 use super::progress::Progress;
 use super::report::ReportArgs;
+use super::{Usage, address};
 use super::{print, provenance};
 use anyhow::{Context, Result, anyhow};
-use nirspi::calibration::{
-    KeptCalibration, KeptFlatField, Settling, Sweeps, calibrate, measure_dark, measure_flat_field,
-    path_of,
-};
+use nirspi::calibration::{KeptCalibration, KeptFlatField, Sweeps, calibrate, path_of};
+use nirspi::capture::{measure_dark, measure_flat_field};
 use nirspi::exposure::{Length, Light};
+use nirspi::response::Settling;
 use nirspi::session::{IgnorePackets, Session};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;

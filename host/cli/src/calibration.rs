@@ -2,8 +2,8 @@
 
 use super::Usage;
 use anyhow::Result;
-use nirspi::calibration::{CalibrationPolicy, Choice, PolicyError};
-use nirspi::session::CameraIdentity;
+use nirspi::capture::{CalibrationPolicy, Choice, PolicyError};
+use nirspi::identity::CameraIdentity;
 use nirspi::setup::MeasurementSetup;
 use std::path::PathBuf;
 

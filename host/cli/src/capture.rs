@@ -5,8 +5,9 @@ use super::camera::{self, CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
 use super::report::ReportArgs;
 use super::{Usage, address, print, progress, provenance};
 use anyhow::Result;
-use nirspi::calibration::Origin;
-use nirspi::capture::{CaptureOptions, CaptureReport, Preview, Progress, StopCause, observe};
+use nirspi::capture::{
+    CaptureOptions, CaptureReport, Origin, Preview, Progress, StopCause, observe,
+};
 use nirspi::exposure::Light;
 use nirspi::files::interrupt;
 use nirspi::files::output::refuse_dash;

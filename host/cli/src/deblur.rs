@@ -8,7 +8,7 @@ use super::provenance::made;
 use super::report::stages;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use nirspi::files::stack::{ImageStack, StackTarget};
+use nirspi::imaging::stack::{ImageStack, StackTarget};
 use nirspi::imaging::{Deblurring, SPREAD_COPIES};
 use nirspi_nets::classical;
 use nirspi_nets::deblur::Model;

@@ -13,9 +13,9 @@ use nirspi::files::image::encode_grey;
 use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
+use nirspi::identity::CameraIdentity;
 use nirspi::imaging::{KnownReadings, MethodReport, Quality, score, share_of_white};
 use nirspi::picture::Pictures;
-use nirspi::session::CameraIdentity;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{
     CameraModel, Panels, SCENE_PX, Stages, StagesReport, calibrate_against_white, enhance_stages,

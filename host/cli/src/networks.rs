@@ -1,10 +1,9 @@
 //! The common parts of commands that run networks: weights, device, progress, report.
 
-use super::Usage;
-use super::print;
 use super::report::{Overwrite, ReportArgs, StageTimes};
+use super::{Usage, print};
 use anyhow::{Context, Result};
-use nirspi::files::stack::{ImageStack, StackTarget};
+use nirspi::imaging::stack::{ImageStack, StackTarget};
 use nirspi::imaging::{Deblurring, StackReport};
 use nirspi::picture::Pictures;
 use nirspi_nets::{Arithmetic, Backend, Device, Images, Networks, WeightsError};

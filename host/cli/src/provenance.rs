@@ -1,7 +1,7 @@
 //! This program in the provenance of what it writes.
 
+use nirspi::identity::CameraIdentity;
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
-use nirspi::session::CameraIdentity;
 use std::sync::LazyLock;
 
 static MADE: LazyLock<Made> = LazyLock::new(|| {

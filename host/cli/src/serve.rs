@@ -6,10 +6,10 @@ use super::method::MethodArgs;
 use super::provenance::made;
 use super::{Usage, address, print};
 use anyhow::{Context, Result, anyhow, bail};
-use nirspi::calibration::Choice;
+use nirspi::address::CameraAddress;
+use nirspi::capture::Choice;
 use nirspi::exposure::Light;
 use nirspi::files::{interrupt, read_small_text};
-use nirspi::link::CameraAddress;
 use nirspi::serve::settings::{MAX_FRAMES, Settings};
 use nirspi::serve::{
     Access, BasePath, CameraSource, Connect, Connected, HostName, Imaging, Server, StagedScene,

@@ -2,8 +2,9 @@
 
 use crate::DISTANCES_M;
 use crate::error::{EvalError, Result};
-use nirspi::calibration::{FlatField, Settling};
+use nirspi::calibration::FlatField;
 use nirspi::capture::{Capture, Progress};
+use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{self, VirtualOptics};
 use nirspi_optics::rain::Air;

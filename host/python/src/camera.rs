@@ -12,11 +12,13 @@ pub use run::Run;
 
 use crate::errors::{of_opening, refusal, refused};
 use crate::work::long;
-use nirspi::calibration::{CalibrationPolicy, Settling};
+use nirspi::capture::CalibrationPolicy;
+use nirspi::response::Settling;
 use nirspi::capture::{Calibration, CaptureError, CaptureOptions};
 use nirspi::causes::in_one_line;
 use nirspi::frame_time::HostClock;
-use nirspi::link::{CameraAddress, Link};
+use nirspi::link::Link;
+use nirspi::address::CameraAddress;
 use nirspi::recording::Target;
 use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;

@@ -2,7 +2,7 @@
 
 use nirspi::causes::in_one_line;
 use nirspi::files::FileError;
-use nirspi::link::OpenError;
+use nirspi::address::OpenError;
 use nirspi::recording::RecordingError;
 use nirspi::source::SourceError;
 use pyo3::PyErr;

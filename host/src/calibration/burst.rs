@@ -15,17 +15,17 @@
 //! wrong, and most pictures are inverted.
 
 use crate::clock::Instant;
+use crate::response::{self, Settling};
 use crate::session::{Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
-use nirspi_recon::{Leak, LeakError, Rows, Side};
+use nirspi_recon::{Rows, Side};
 use nirspi_wire::register::RAW_SAMPLES_MAX;
 use nirspi_wire::{DeviceMessage, PacketError, Raw, State};
-use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use thiserror::Error;
 
 /// Clocks that the LEDs stay on, and off, in the calibration burst: 1 us.
-pub const HALF_PERIOD: u16 = 128;
+pub const HALF_PERIOD: u16 = response::LONGEST;
 /// The step must exceed the noise of its mean by this factor.
 const MIN_STEP_TO_NOISE: f64 = 20.0;
 /// The response has left zero when it exceeds this share of the step.
@@ -38,22 +38,6 @@ const ASK_EVERY: Duration = Duration::from_millis(500);
 const STALLED: Duration = Duration::from_secs(30);
 /// Number of averaged bursts: 2 ms of light reduce the noise of the taps to about a thousandth.
 pub const BURSTS: usize = 64;
-
-/// The measured response of LEDs, amplifier and ADC.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Settling {
-    /// Latency from light to sample, in whole clocks.
-    pub adc_latency: u8,
-    /// Step response by clock, from the first sample that shows the step to the sample that has
-    /// settled at 1.
-    pub response: Vec<f64>,
-    /// Reading of a sample with all LEDs off: daylight and the ADC's offset.
-    pub dark_counts: f64,
-    /// Reading with all LEDs on, minus the reading with all LEDs off.
-    pub step_counts: f64,
-    /// Standard deviation of one sample.
-    pub noise_counts: f64,
-}
 
 /// Why a burst gives no calibration.
 #[derive(Debug, Error)]
@@ -293,34 +277,6 @@ impl Settling {
         };
         let (on, off) = (level(0), level(half));
         Self { dark_counts: off, step_counts: on - off, noise_counts, ..self.clone() }
-    }
-
-    /// Shares of a slot's light that are read in its own slot and in each later slot.
-    ///
-    /// # Errors
-    /// If almost none of a slot's light is read in its own slot.
-    pub fn leak(&self, clocks_per_pattern: u16, blanked: u16) -> Result<Leak, LeakError> {
-        let dwell = i64::from(clocks_per_pattern);
-        let step = |n: i64| -> f64 {
-            match usize::try_from(n) {
-                Err(_) => 0.0,
-                Ok(n) => self.response.get(n).copied().unwrap_or(1.0),
-            }
-        };
-        let window = i64::from(blanked)..dwell;
-        let samples = (window.end - window.start) as f64;
-        let slots = self.response.len() as i64 / dwell + 1;
-        let mut taps: Vec<f64> = (0..=slots + 1)
-            .map(|slot| {
-                let passed = |n: i64| step(n + slot * dwell) - step(n + (slot - 1) * dwell);
-                window.clone().map(passed).sum::<f64>() / samples
-            })
-            .collect();
-        // Slots after the response's last sample contain no light.
-        while taps.len() > 1 && taps.last() == Some(&0.0) {
-            taps.pop();
-        }
-        Leak::new(taps)
     }
 }
 

@@ -3,13 +3,12 @@
 use super::kept::path_with;
 use crate::files::output::keep;
 use crate::files::{FileError, read_small_text};
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
 use etcetera::HomeDirError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::fmt;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fmt, io};
 use thiserror::Error;
 
 /// What is kept in a file.

@@ -11,11 +11,11 @@
 //! A calibration of another camera, or of other gateware, is never applied
 //! (`tests::a_calibration_of_something_else_is_refused_in_one_line`).
 
-use super::Settling;
 use super::file::{Kept, KeptFileError};
-use crate::clock;
-use crate::selftest::Check;
-use crate::session::CameraIdentity;
+use crate::check::Check;
+use crate::clock::date;
+use crate::identity::CameraIdentity;
+use crate::response::Settling;
 use etcetera::{BaseStrategy, choose_base_strategy};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -125,12 +125,6 @@ fn file_name(serial: &str) -> String {
         .collect()
 }
 
-/// A time as `2026-11-20 08:30 UTC`.
-pub(crate) fn date(unix_s: u64) -> String {
-    let [year, month, day, hour, minute, _] = clock::calendar(unix_s);
-    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -236,18 +230,5 @@ mod tests {
     fn serial_numbers_become_file_names_one_each() {
         assert_eq!(file_name("virtual-1"), "virtual-1");
         assert_eq!(file_name("../a b%"), "%2e%2e%2fa%20b%25");
-    }
-
-    #[test]
-    fn dates_are_those_of_the_calendar() {
-        for (unix_s, expected) in [
-            (0, "1970-01-01 00:00 UTC"),
-            (951_827_696, "2000-02-29 12:34 UTC"),
-            (1_709_251_199, "2024-02-29 23:59 UTC"),
-            (1_709_251_200, "2024-03-01 00:00 UTC"),
-            (4_107_542_400, "2100-03-01 00:00 UTC"),
-        ] {
-            assert_eq!(date(unix_s), expected);
-        }
     }
 }

@@ -9,20 +9,12 @@
 //! (`a_dark_scene_uses_the_kept_latency_or_fails` in `host/tests/calibration.rs`).
 
 mod burst;
-mod check;
 mod file;
 mod flat;
 mod kept;
-mod policy;
 
 pub(crate) use burst::ONSET;
-pub use burst::{BURSTS, CalibrationError, HALF_PERIOD, Settling, calibrate, calibrate_or};
-pub use check::SettlingError;
+pub use burst::{BURSTS, CalibrationError, HALF_PERIOD, calibrate, calibrate_or};
 pub use file::{Kept, KeptFileError};
-pub use flat::{
-    FlatField, FlatFieldError, FramesError, KeptFlatField, Measured, Sweeps, measure_dark,
-    measure_flat_field, pattern_noise,
-};
-pub(crate) use kept::date;
+pub use flat::{FlatField, FramesError, KeptFlatField, Measured, Sweeps, pattern_noise};
 pub use kept::{KeptCalibration, path_of};
-pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};

@@ -102,8 +102,9 @@ mod tests {
     use super::*;
     use crate::account::FailedChecks;
     use crate::files::interrupt::Signal;
+    use crate::identity::CameraIdentity;
     use crate::integrate::Integrated;
-    use crate::session::{CameraIdentity, SessionError};
+    use crate::session::SessionError;
     use crate::setup::MeasurementSetup;
     use nirspi_recon::Order;
     use nirspi_wire::Fault;

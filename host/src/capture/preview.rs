@@ -2,9 +2,10 @@
 
 use super::{Observer, Progress, StopCause};
 use crate::account::LossCounters;
-use crate::calibration::{CalibrationError, Settling};
+use crate::calibration::CalibrationError;
 use crate::clock::Instant;
 use crate::integrate::Integrated;
+use crate::response::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_recon::Image;
 use nirspi_recon::reconstruct::{Method, MethodSettings, Reconstruct};

@@ -2,9 +2,9 @@
 
 use super::{Capture, CaptureError};
 use crate::account::{FailedChecks, LossCounters};
-use crate::calibration::{Choice, Origin};
+use crate::capture::{Choice, Origin};
 use crate::causes::in_one_line;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
 use crate::signal::Signal;
 use serde::Serialize;
 use std::io;

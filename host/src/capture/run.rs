@@ -5,15 +5,15 @@ use super::junk::Junk;
 use super::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
 };
-use crate::calibration::{CalibrationError, Settling, calibrate, calibrate_or};
+use crate::calibration::{CalibrationError, calibrate, calibrate_or};
 use crate::clock::Instant;
-use crate::recording::{Recorder, Recording, RunAccount};
-use crate::replay::Recorded;
+use crate::recording::{Recorder, Recording, RunAccount, tally_recording};
+use crate::response::Settling;
 use crate::session::{
-    ANSWER_TIMEOUT, IgnorePackets, Listener, Request, Session, SessionError, request,
+    ANSWER_TIMEOUT, IgnorePackets, Listener, Recorded, Request, Session, SessionError, request,
 };
 use crate::setup::MeasurementSetup;
-use crate::tally::{Tally, tally_recording};
+use crate::tally::Tally;
 use nirspi_wire::{
     Answer, DeviceMessage, Event, EventKind, Fault, PacketError, Refusal, Reply, RunLength, State,
     Status,

@@ -8,8 +8,8 @@ use crate::files::FileError;
 use crate::files::output::{Existing, write_in_pieces};
 use crate::integrate::Integrated;
 use crate::provenance::Provenance;
-use crate::recording::{Book, Opening, Recording};
-use crate::tally::{Heard, Tally, hear_recording};
+use crate::recording::{Book, Heard, Opening, Recording, hear_recording};
+use crate::tally::Tally;
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use crate::{depth_image, recording::Pinhole};
 use nirspi_recon::Image;

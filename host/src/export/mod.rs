@@ -18,10 +18,9 @@ use crate::files::FileError;
 use crate::files::output::Existing;
 use crate::integrate::{IntegrateError, Integrated};
 use crate::provenance::Made;
-use crate::recording::{Recording, RecordingError};
+use crate::recording::{Recording, RecordingError, hear_recording};
 use crate::setup::MeasurementSetup;
 use crate::source::{self, Source, SourceError, SourceOptions};
-use crate::tally::hear_recording;
 #[cfg(any(feature = "live", feature = "virtual-camera"))]
 use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;

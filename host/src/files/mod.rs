@@ -26,8 +26,6 @@ pub mod output;
 #[cfg(not(target_family = "wasm"))]
 pub mod problem;
 pub mod settings;
-#[cfg(all(feature = "pictures", not(target_family = "wasm")))]
-pub mod stack;
 pub mod table;
 
 #[cfg(not(target_family = "wasm"))]

@@ -15,6 +15,8 @@ mod method_report;
 mod quality;
 #[cfg(feature = "enhance")]
 mod readings;
+#[cfg(all(feature = "pictures", not(target_family = "wasm")))]
+pub mod stack;
 #[cfg(feature = "enhance")]
 mod stack_report;
 #[cfg(feature = "enhance")]

@@ -4,8 +4,6 @@
 //! A link moves bytes and does not interpret packets. A browser has none of these links.
 
 #[cfg(not(target_family = "wasm"))]
-mod address;
-#[cfg(not(target_family = "wasm"))]
 mod serial;
 #[cfg(not(target_family = "wasm"))]
 mod tcp;
@@ -14,7 +12,6 @@ pub mod usb;
 
 #[cfg(not(target_family = "wasm"))]
 pub use self::{
-    address::{CameraAddress, OpenError},
     serial::{DEFAULT_BAUD, SerialLink, serial_ports},
     tcp::TcpLink,
     usb::UsbLink,

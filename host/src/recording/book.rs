@@ -6,9 +6,9 @@ use super::{
     ACCOUNT, CHECKSUM, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, encoding,
     reader::checksum,
 };
-use crate::calibration::Settling;
+use crate::identity::CameraIdentity;
 use crate::provenance::{KEY, Provenance};
-use crate::session::CameraIdentity;
+use crate::response::Settling;
 use crate::setup::MeasurementSetup;
 use crate::tally::Tally;
 use mcap::records::{MessageHeader, Metadata};

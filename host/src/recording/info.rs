@@ -2,9 +2,9 @@
 
 use super::{Recording, RecordingError, RunAccount};
 use crate::account::{FailedChecks, LossCounters};
-use crate::calibration::date;
-use crate::session::CameraIdentity;
-use crate::tally::hear_recording;
+use crate::clock::date;
+use crate::identity::CameraIdentity;
+use crate::recording::hear_recording;
 use nirspi_recon::words::count;
 use serde::Serialize;
 use std::fmt;

@@ -20,6 +20,7 @@
 
 mod book;
 mod file;
+mod hear;
 mod info;
 mod monitor;
 mod protobuf;
@@ -34,6 +35,7 @@ mod writer;
 
 pub(crate) use book::{Book, Opening};
 pub use file::Target;
+pub use hear::{Heard, frames_of_recording, hear_recording, tally_recording};
 pub use info::RecordingInfo;
 pub use reader::{End, Packet, Recording, RecordingError};
 pub use recover::{RecoverError, Recovered, recover};

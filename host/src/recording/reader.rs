@@ -5,8 +5,8 @@ use super::{
     ACCOUNT, CHECKSUM, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC,
     protocol_of,
 };
-use crate::calibration::Settling;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
+use crate::response::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{crc32, version};

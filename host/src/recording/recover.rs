@@ -4,7 +4,7 @@ use super::{Book, Opening, Recording, RecordingError, RunAccount};
 use crate::account::LossCounters;
 use crate::files::FileError;
 use crate::files::output::{Existing, write_in_pieces};
-use crate::tally::hear_recording;
+use crate::recording::hear_recording;
 use nirspi_recon::words::count;
 use serde::Serialize;
 use std::fmt;

@@ -1,7 +1,7 @@
 //! The answers of a replayed camera to its host.
 
-use super::Recorded;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
+use crate::session::Recorded;
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{
     Capabilities, ConfigField, ConfigProblem, Configuration, Identity, SIDE, State, Status, Version,

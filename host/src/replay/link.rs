@@ -2,10 +2,11 @@
 
 use super::answers::{misfit, status};
 use super::stream::{Playing, Turn};
-use super::{Recorded, ReplayAddress, Speed};
+use super::{ReplayAddress, Speed};
+use crate::identity::CameraIdentity;
 use crate::link::{Link, Received};
 use crate::recording::{Recording, RecordingError};
-use crate::session::CameraIdentity;
+use crate::session::Recorded;
 use nirspi_wire::packet::{MAX_DEVICE_PACKET, MAX_HOST_PACKET};
 use nirspi_wire::{
     Answer, Command, Deframed, Deframer, DeviceMessage, Refusal, Reply, Request, RunLength, State,

@@ -15,8 +15,6 @@ mod stream;
 
 pub use link::ReplayLink;
 
-use crate::calibration::Settling;
-use crate::setup::MeasurementSetup;
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -83,14 +81,4 @@ impl fmt::Display for ReplayAddress {
             Speed::Max => f.write_str(",max"),
         }
     }
-}
-
-/// What a recording knows of its measurement. A capture of a replay uses this in place of its own
-/// setup and calibration.
-#[derive(Debug, Clone)]
-pub struct Recorded {
-    /// The setup of the measurement.
-    pub setup: MeasurementSetup,
-    /// The settling of the camera, if the recording holds it.
-    pub settling: Option<Settling>,
 }

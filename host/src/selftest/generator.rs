@@ -4,8 +4,8 @@
 //! The compared sums have passed through sequencer, windowing, accumulators, host port, firmware,
 //! packets and link, and are known to the last bit.
 
-use super::check::{Check, Limit};
 use super::stream::{Shot, shots};
+use crate::check::{Check, Limit};
 use crate::session::{Session, SessionError};
 use nirspi_wire::register::{TEST_SEED, test_sample};
 use nirspi_wire::{CLOCKS_PER_PATTERN, Configuration, PATTERNS, PatternOrder, SampleSource};

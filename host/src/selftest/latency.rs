@@ -7,9 +7,10 @@
 //! full difference is the latency. The raw burst, which does not use the setting, must give the
 //! same latency.
 
-use super::check::{Check, Limit};
 use super::stream::shots;
-use crate::calibration::{HALF_PERIOD, ONSET, Settling};
+use crate::calibration::{HALF_PERIOD, ONSET};
+use crate::check::{Check, Limit};
+use crate::response::Settling;
 use crate::session::{Session, SessionError};
 use nirspi_wire::register::LATENCY_MAX;
 use nirspi_wire::{Configuration, PatternOrder, SampleSource};

@@ -11,8 +11,8 @@
 //!   pattern. Pattern 0 lights all LEDs at once, every other pattern lights half. If the LEDs'
 //!   supply drops under load, the halves add up to more.
 
-use super::check::{Check, Limit};
 use super::stream::shots;
+use crate::check::{Check, Limit};
 use crate::session::{Session, SessionError};
 use nirspi_recon::{FwhtLengthError, fwht};
 use nirspi_wire::{Configuration, PATTERNS, PatternOrder, SIDE, SampleSource};

@@ -2,8 +2,8 @@
 //! slower pace.
 
 use super::LinkDemands;
-use super::check::{Check, Limit};
 use super::stream::stream;
+use crate::check::{Check, Limit};
 use crate::session::{Session, SessionError};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{Rows, Side};

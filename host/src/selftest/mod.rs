@@ -10,18 +10,17 @@
 //! A verdict follows from a measured value and a limit, and both are shown
 //! (`check::tests::the_verdict_follows_from_value_and_limit`).
 
-mod check;
 mod generator;
 mod latency;
 mod leds;
 mod link;
 mod stream;
 
-pub use check::{Check, Limit, Verdict};
-
-use crate::calibration::{CalibrationError, Settling, calibrate};
+use crate::calibration::{CalibrationError, calibrate};
 use crate::causes;
-use crate::fpga::{Fpga, FpgaProblem, Sampling, design_in_words};
+use crate::check::{Check, Limit, Verdict};
+use crate::fpga::{Fpga, FpgaProblem, Sampling};
+use crate::response::Settling;
 use crate::session::{IgnorePackets, Session, SessionError};
 use crate::versions::of_register;
 use nirspi_wire::register::{IDENTITY, clocks};
@@ -178,7 +177,7 @@ fn device(report: SelfTestReport, fpga: &Fpga) -> Vec<Check> {
         }
         SelfTestReport::GATEWARE => told(fpga.check_gateware().map(|design| {
             let version = of_register(fpga.version().unwrap_or_default());
-            format!("{version}, {}", design_in_words(design))
+            format!("{version}, {design}")
         })),
         SelfTestReport::ADC_CLOCK => told(fpga.check_clock().map(|mhz| {
             let (expected, off) = (ADC_HZ / 1_000_000, clocks::TOLERANCE_PERCENT);

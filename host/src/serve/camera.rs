@@ -13,7 +13,7 @@ use super::settings::Measuring;
 use super::stage::StagedScene;
 use super::{ForeignError, Shared, lock};
 use crate::account::{FailedChecks, LossCounters};
-use crate::calibration::{CalibrationError, FlatField, KeptFlatField, Settling};
+use crate::calibration::{CalibrationError, FlatField, KeptFlatField};
 use crate::capture::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
 };
@@ -21,6 +21,7 @@ use crate::clock::Instant;
 use crate::events::{self, Level};
 use crate::integrate::Newest;
 use crate::recording::Target;
+use crate::response::Settling;
 use crate::session::{IgnorePackets, Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
 use crate::{causes, depth_image};

@@ -5,7 +5,7 @@ use crate::account::FailedChecks;
 use crate::boards;
 use crate::clock::{self, Instant};
 use crate::events::Level;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use crate::versions::{self, Part};
 use nirspi_wire::Status;

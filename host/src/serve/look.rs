@@ -1,9 +1,10 @@
 //! What the imaging thread gets of the newest frames.
 
 use crate::account::LossCounters;
-use crate::calibration::{FlatField, Settling};
+use crate::calibration::FlatField;
 use crate::clock::Instant;
 use crate::integrate::Integrated;
+use crate::response::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_nets::DepthMaps;
 use std::sync::Arc;

@@ -3,8 +3,8 @@
 use super::begin::TurnsError;
 use super::line::Line;
 use super::{CameraSource, Connected, ForeignError, StagedScene, Turns};
-use crate::calibration::Settling;
 use crate::capture::Calibration;
+use crate::response::Settling;
 use crate::scene::SceneSource;
 use crate::session::Session;
 use crate::virtual_camera::{MemoryLink, VirtualOptics, calibrate_against_white};

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::link::Received;
+use nirspi_wire::Identity;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
     Answer, Capabilities, CrashReport, Event, EventKind, Fault, Refusal, Reply, State, Version,

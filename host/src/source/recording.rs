@@ -6,8 +6,8 @@ use crate::calibration::KeptFlatField;
 use crate::causes;
 use crate::integrate::Integrated;
 use crate::provenance::Taken;
-use crate::recording::{End, Recording};
-use crate::tally::{self, Tally, tally_recording};
+use crate::recording::{self, End, Recording, tally_recording};
+use crate::tally::Tally;
 use std::path::Path;
 
 /// Sums the frames of a recording, and makes their account again.
@@ -48,7 +48,7 @@ pub(super) fn frames_of_recording(
     let mut recording = Recording::open(path)?;
     let (rows, area) = (recording.setup.rows.len(), recording.setup.rows.side());
     let fits = |count| fits_together(path, count, rows, area);
-    let (frames, tally) = tally::frames_of_recording(&mut recording, fits)?;
+    let (frames, tally) = recording::frames_of_recording(&mut recording, fits)?;
     if frames.is_empty() {
         return Err(no_frame(path, &tally));
     }

@@ -8,7 +8,8 @@
 //! in every picture. The tests compare pictures with captures by the whole camera
 //! (`tests::a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone`).
 
-use crate::calibration::{CalibrationError, Settling, calibrate};
+use crate::calibration::{CalibrationError, calibrate};
+use crate::response::Settling;
 use crate::session::{IgnorePackets, Session, SessionError};
 use crate::virtual_camera::{MemoryLink, VirtualOptics, VirtualOpticsError};
 use nirspi_nets::data::SIDE_PX;

@@ -2,13 +2,13 @@
 //! host.
 
 use super::{MemoryLink, VirtualOptics, VirtualOpticsError};
-use crate::calibration::{
-    CalibrationError, FlatField, FlatFieldError, Settling, Sweeps, calibrate, measure_flat_field,
-};
+use crate::calibration::{CalibrationError, FlatField, Sweeps, calibrate};
 use crate::capture::{
-    Calibration, Capture, CaptureError, CaptureOptions, Ended, Progress, StopCause, capture,
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, FlatFieldError, Progress, StopCause,
+    capture, measure_flat_field,
 };
 use crate::integrate::IntegrateError;
+use crate::response::Settling;
 use crate::session::{IgnorePackets, Session, SessionError};
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{Measurements, Order, RowsError, reconstruct};

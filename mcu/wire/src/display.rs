@@ -3,7 +3,7 @@
 //! The firmware sends values and no text, so the firmware does not link this module.
 
 use crate::message::HOST_SILENCE_US;
-use crate::register::{DAMAGED, IDENTITY, NO_CLOCK};
+use crate::register::{DAMAGED, Design, IDENTITY, NO_CLOCK};
 use crate::{ConfigField, Fault, State};
 use core::fmt::{Display, Formatter, Result};
 
@@ -15,6 +15,18 @@ impl Display for State {
             Self::Configured => "configured and not running",
             Self::Running => "running",
             Self::Fault => "stopped by a fault",
+        })
+    }
+}
+
+/// What gateware is built for.
+impl Display for Design {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        f.write_str(match self {
+            Self::Camera => "camera",
+            Self::BringUp => {
+                "bring-up without ADC: samples are made of the levels of the LED lines"
+            }
         })
     }
 }

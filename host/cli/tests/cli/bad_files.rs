@@ -1,9 +1,9 @@
 //! Files that are not what they should be: one line, no result, nothing left behind.
 
 use crate::bench::{Bench, Measured};
-use nirspi::calibration::Settling;
+use nirspi::identity::CameraIdentity;
 use nirspi::recording::{Recorder, RunAccount, Target};
-use nirspi::session::CameraIdentity;
+use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;

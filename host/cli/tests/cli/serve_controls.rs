@@ -2,8 +2,7 @@
 
 use crate::bench::{Bench, correlation};
 use crate::serve::serve;
-use nirspi::recording::Recording;
-use nirspi::tally::tally_recording;
+use nirspi::recording::{Recording, tally_recording};
 use serde_json::{Value, json};
 
 /// The bytes in base64. Their number is padded to a multiple of 3 by zeros that the text leaves out.

@@ -2,7 +2,7 @@
 
 use crate::errors::{refusal, refused};
 use crate::orders::named;
-use nirspi::calibration::CalibrationPolicy;
+use nirspi::capture::CalibrationPolicy;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::{CameraModel, VirtualOptics};

@@ -6,7 +6,8 @@ use crate::errors::{refusal, refused};
 use crate::measurement::FlatField;
 use crate::work::SIGNALS;
 use nirspi::account::LossCounters;
-use nirspi::calibration::{CalibrationError, Settling};
+use nirspi::calibration::CalibrationError;
+use nirspi::response::Settling;
 use nirspi::capture::{
     Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause, observe,
 };

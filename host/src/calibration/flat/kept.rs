@@ -9,8 +9,9 @@
 
 use super::{FlatField, Measured, Sweeps};
 use crate::calibration::file::{Kept, KeptFileError};
-use crate::calibration::kept::{date, path_with};
-use crate::session::CameraIdentity;
+use crate::calibration::kept::path_with;
+use crate::clock::date;
+use crate::identity::CameraIdentity;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};

@@ -17,10 +17,10 @@
 //! `host/tests/flat_field.rs`).
 
 mod kept;
-mod measure;
+mod measured;
 
 pub use kept::KeptFlatField;
-pub use measure::{FlatFieldError, Measured, Sweeps, measure_dark, measure_flat_field};
+pub use measured::{Measured, Sweeps};
 
 use nirspi_recon::{Image, Side};
 use serde::{Deserialize, Serialize};

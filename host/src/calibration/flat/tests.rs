@@ -1,5 +1,5 @@
 use super::*;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
 use std::time::{Duration, UNIX_EPOCH};
 
 fn image(of: impl Fn(usize) -> f32) -> Image {

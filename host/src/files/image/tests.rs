@@ -275,11 +275,12 @@ fn a_picture_of_another_size_is_refused_before_its_pixels_are_decoded() {
     };
     for (width, height) in [(65, 64), (64, 65), (8192, 8192)] {
         let (_folder, path) = file("in.png", &headed(width, height));
-        let told = crate::files::stack::ImageStack::read(&path, 64, false).unwrap_err().to_string();
+        let told =
+            crate::imaging::stack::ImageStack::read(&path, 64, false).unwrap_err().to_string();
         let expected = format!("images of {height} x {width} pixels, expected 64 x 64");
         assert!(told.contains(&expected), "{told}");
     }
     let (_folder, path) = file("in.png", &headed(64, 64));
-    let told = crate::files::stack::ImageStack::read(&path, 64, false).unwrap_err().to_string();
+    let told = crate::imaging::stack::ImageStack::read(&path, 64, false).unwrap_err().to_string();
     assert!(told.contains("damaged or cut short"), "{told}");
 }

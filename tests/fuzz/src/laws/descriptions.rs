@@ -1,7 +1,8 @@
 //! Camera descriptions, calibrations, flat fields, order tables, settings files.
 
 use crate::{Law, MIB, place, read, seeds};
-use nirspi::calibration::{KeptCalibration, KeptFlatField, Settling};
+use nirspi::calibration::{KeptCalibration, KeptFlatField};
+use nirspi::response::Settling;
 use nirspi::files::order_table::read_order_table;
 use nirspi::files::settings::{Options, Takes, from_file};
 use nirspi::virtual_camera::read_camera_model;
@@ -26,7 +27,7 @@ pub const LAWS: &[Law] = &[
         readers: &[
             "host/src/calibration/kept.rs",
             "host/src/calibration/file.rs",
-            "host/src/calibration/check.rs",
+            "host/src/response.rs",
         ],
         holds: calibrations,
         seeds: || vec![serde_json::to_vec(&calibration()).expect("JSON")],

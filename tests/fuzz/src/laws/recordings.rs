@@ -3,7 +3,7 @@
 use crate::{Law, MIB, place, read, seeds};
 use nirspi::recording::{Recording, RecordingInfo, recover};
 use nirspi::source::{Source, SourceOptions};
-use nirspi::tally::tally_recording;
+use nirspi::recording::tally_recording;
 use std::path::Path;
 
 pub const LAWS: &[Law] = &[
@@ -14,6 +14,7 @@ pub const LAWS: &[Law] = &[
             "host/src/recording/reader.rs",
             "host/src/recording/scan.rs",
             "host/src/recording/info.rs",
+            "host/src/recording/hear.rs",
             "host/src/tally.rs",
             "host/src/source/recording.rs",
         ],

@@ -1,8 +1,9 @@
 //! Tests of a bring-up through the RTL: two boards without ADC, and an ADC without clock.
 
 use crate::ideal;
+use nirspi::check::{Check, Verdict};
 use nirspi::fpga::{Fpga, Sampling};
-use nirspi::selftest::{Check, LinkDemands, SelfTest, Verdict, run};
+use nirspi::selftest::{LinkDemands, SelfTest, run};
 use nirspi::session::{IgnorePackets, Session};
 use nirspi::virtual_camera::{MemoryLink, VirtualCamera};
 use nirspi_tests_rtl::RtlFpga;

@@ -1,14 +1,33 @@
-//! Checks that a calibration read from a file is one that a burst can give.
+//! The response of a camera to a step of its light: latency, settling, and the leak that follows.
 
-use super::Settling;
-use super::burst::HALF_PERIOD;
+use nirspi_recon::{Leak, LeakError};
 use nirspi_wire::ADC_MAX;
 use nirspi_wire::register::LATENCY_MAX;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+/// The longest response in ADC clocks: as long as the LEDs stay on in the calibration burst.
+pub const LONGEST: u16 = 128;
 
 /// The largest value of a response. Neither overshoot nor the noise of a dim burst exceeds its step
 /// by this factor.
 const LARGEST_RESPONSE: f64 = 4.0;
+
+/// The measured response of LEDs, amplifier and ADC.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settling {
+    /// Latency from light to sample, in whole clocks.
+    pub adc_latency: u8,
+    /// Step response by clock, from the first sample that shows the step to the sample that has
+    /// settled at 1.
+    pub response: Vec<f64>,
+    /// Reading of a sample with all LEDs off: daylight and the ADC's offset.
+    pub dark_counts: f64,
+    /// Reading with all LEDs on, minus the reading with all LEDs off.
+    pub step_counts: f64,
+    /// Standard deviation of one sample.
+    pub noise_counts: f64,
+}
 
 /// A number that no burst can give.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -23,6 +42,34 @@ pub struct SettlingError {
 }
 
 impl Settling {
+    /// Shares of a slot's light that are read in its own slot and in each later slot.
+    ///
+    /// # Errors
+    /// If almost none of a slot's light is read in its own slot.
+    pub fn leak(&self, clocks_per_pattern: u16, blanked: u16) -> Result<Leak, LeakError> {
+        let dwell = i64::from(clocks_per_pattern);
+        let step = |n: i64| -> f64 {
+            match usize::try_from(n) {
+                Err(_) => 0.0,
+                Ok(n) => self.response.get(n).copied().unwrap_or(1.0),
+            }
+        };
+        let window = i64::from(blanked)..dwell;
+        let samples = (window.end - window.start) as f64;
+        let slots = self.response.len() as i64 / dwell + 1;
+        let mut taps: Vec<f64> = (0..=slots + 1)
+            .map(|slot| {
+                let passed = |n: i64| step(n + slot * dwell) - step(n + (slot - 1) * dwell);
+                window.clone().map(passed).sum::<f64>() / samples
+            })
+            .collect();
+        // Slots after the response's last sample contain no light.
+        while taps.len() > 1 && taps.last() == Some(&0.0) {
+            taps.pop();
+        }
+        Leak::new(taps)
+    }
+
     /// Checks that a burst can give this calibration. Every calibration read from a file must pass.
     ///
     /// # Errors
@@ -37,8 +84,8 @@ impl Settling {
             return Err(wrong("adc_latency", &self.adc_latency, format!("0 to {LATENCY_MAX}")));
         }
         let length = self.response.len();
-        if length > usize::from(HALF_PERIOD) {
-            let expected = format!("at most {HALF_PERIOD} samples");
+        if length > usize::from(LONGEST) {
+            let expected = format!("at most {LONGEST} samples");
             return Err(wrong("length of the response", &length, expected));
         }
         for (at, response) in self.response.iter().enumerate() {

@@ -1,10 +1,10 @@
 //! Chooses the calibration of a capture: the kept calibration of the camera, one from a file, or a
 //! new measurement.
 
-use super::{KeptCalibration, KeptFileError, KeptFlatField, path_of};
-use crate::capture::{Calibration, Capture};
+use super::{Calibration, Capture};
+use crate::calibration::{KeptCalibration, KeptFileError, KeptFlatField, path_of};
 use crate::causes;
-use crate::session::CameraIdentity;
+use crate::identity::CameraIdentity;
 use crate::setup::MeasurementSetup;
 use serde::Serialize;
 use std::path::PathBuf;

@@ -5,12 +5,12 @@
 //! The path of the results is checked before anything is computed: [`ImageStack::target`] fails
 //! first (`host/cli/tests/cli/enhance.rs`).
 
-use super::FileError;
-use super::image::{
+use crate::files::FileError;
+use crate::files::image::{
     FOR_PEOPLE, Grey, encode_grey, is_picture, pictures_in, provenance_of, read_grey, read_grey_if,
 };
-use super::npy;
-use super::output::{Existing, OutputDir, write_result};
+use crate::files::npy;
+use crate::files::output::{Existing, OutputDir, write_result};
 use crate::picture::{Panel, Pictures, Sheet, SideBySide, Unit};
 use crate::provenance::{Provenance, Taken};
 use std::path::{Path, PathBuf};

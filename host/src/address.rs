@@ -1,8 +1,8 @@
 //! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]` and
 //! `replay:REC[,SPEED]`.
 
-use super::usb::UsbError;
-use super::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
+use crate::link::usb::UsbError;
+use crate::link::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
 use crate::recording::RecordingError;
 use crate::replay::{ReplayAddress, ReplayLink};
 use crate::session::{Session, SessionError};
