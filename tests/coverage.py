@@ -78,7 +78,7 @@ PLACES = [
         ["host/src/recording/reader.rs", "host/src/recording/scan.rs", "host/src/recording/run.rs", "host/src/tally.rs"],
     ),
     ("weights of networks", [("nirspi-tests", "mutated_files", "weights")], ["host/nets/src/weights.rs"]),
-    ("settings that a page sends", [("nirspi-tests", "mutated_files", "what_a_page")], ["host/src/serve/settings.rs"]),
+    ("settings that a page sends", [("nirspi-tests", "mutated_files", "what_a_page")], ["host/serve/src/settings.rs"]),
     ("bitstreams", [("nirspi-tests", "mutated_files", "bitstreams")], ["mcu/src/staging.rs"]),
 ]
 

@@ -31,13 +31,12 @@
 //!   image or many of what was read,
 //! * [`virtual_camera`] is a camera without hardware: optics simulator, gateware model, real firmware
 //!   logic; [`example`] makes example measurements, [`training`] pairs for training networks,
-//!   [`safety_case`] says what eye and skin receive and what each fault leaves lit,
-//! * [`serve`] shows a camera live on a web page.
+//!   [`safety_case`] says what eye and skin receive and what each fault leaves lit.
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and
-//! reads measurements, without web server, typefaces, optics or networks. The features `enhance`,
-//! `pictures`, `virtual-camera`, `live`, `serve` and `training` add the other parts; `gpu` adds the kernels
-//! for GPUs.
+//! reads measurements, without typefaces, optics or networks. The features `enhance`, `pictures`,
+//! `virtual-camera` and `training` add the other parts; `gpu` adds the kernels for GPUs. The live page is
+//! the crate `nirspi-serve`.
 
 #![cfg_attr(
     target_family = "wasm",
@@ -54,8 +53,8 @@ pub mod capture;
 pub mod causes;
 pub mod check;
 pub mod clock;
-#[cfg(any(feature = "live", feature = "virtual-camera"))]
-mod depth_image;
+#[cfg(feature = "virtual-camera")]
+pub mod depth_image;
 #[cfg(not(target_family = "wasm"))]
 pub mod devices;
 pub mod events;
@@ -92,8 +91,6 @@ pub mod safety_case;
 #[cfg(feature = "pictures")]
 pub mod scene;
 pub mod selftest;
-#[cfg(feature = "live")]
-pub mod serve;
 pub mod session;
 pub mod setup;
 pub mod signal;

@@ -19,7 +19,7 @@ fn tooltips_of_the_page_are_the_glossarys_sentences() {
     let text = read("../docs/glossary.md");
     let glossary = glossary(&text);
     assert!(glossary.keys().is_sorted() && glossary.len() > 20, "{:?}", glossary.keys());
-    let page = read("src/serve/page/words.js");
+    let page = read("serve/src/page/words.js");
     let (before, rest) = page.split_once("const MEANINGS = ").unwrap();
     let (object, after) = rest.split_once(";\n").unwrap();
     let found: BTreeMap<String, String> =
@@ -38,7 +38,7 @@ fn tooltips_of_the_page_are_the_glossarys_sentences() {
         fresh.iter().map(|(word, meaning)| format!("  {word:?}: {meaning:?},\n")).collect();
     let wanted = format!("{before}const MEANINGS = {{\n{}}};\n{after}", lines.concat());
     if std::env::var_os("NIRSPI_BLESS").is_some() {
-        std::fs::write(root.join("src/serve/page/words.js"), wanted).unwrap();
+        std::fs::write(root.join("serve/src/page/words.js"), wanted).unwrap();
     } else {
         assert_eq!(
             page, wanted,

@@ -17,8 +17,8 @@ export RUSTFLAGS='--cfg getrandom_backend="unsupported" -C target-feature=+simd1
 
 # The live page, with a program in the page in place of the server.
 mkdir -p "$folder/page"
-cp "$root"/host/src/serve/page/index.html "$folder/"
-cp "$root"/host/src/serve/page/*.css "$root"/host/src/serve/page/*.js "$folder/page/"
+cp "$root"/host/serve/src/page/index.html "$folder/"
+cp "$root"/host/serve/src/page/*.css "$root"/host/serve/src/page/*.js "$folder/page/"
 cp "$here"/page/*.js "$folder/page/"
 cp "$target/wasm32-unknown-unknown/dist/nirspi_web.wasm" "$folder/page/"
 du -sh "$folder"

@@ -10,17 +10,17 @@ use nirspi::address::CameraAddress;
 use nirspi::capture::Choice;
 use nirspi::exposure::Light;
 use nirspi::files::{interrupt, read_small_text};
-use nirspi::serve::settings::{MAX_FRAMES, Settings};
-use nirspi::serve::{
-    Access, BasePath, CameraSource, Connect, Connected, HostName, Imaging, Server, StagedScene,
-    Token, serve,
-};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::virtual_camera::MemoryLink;
 use nirspi_nets::Device;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::{Sampling, Side};
+use nirspi_serve::settings::{MAX_FRAMES, Settings};
+use nirspi_serve::{
+    Access, BasePath, CameraSource, Connect, Connected, HostName, Imaging, Server, StagedScene,
+    Token, serve,
+};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -14,7 +14,7 @@
 use crate::page;
 use crate::usb::PageLink;
 use nirspi::causes::in_one_line;
-use nirspi::serve::{Turns, TurnsError};
+use nirspi_serve::{Turns, TurnsError};
 use std::cell::RefCell;
 
 /// The program and its buffers. A browser calls from one thread.

@@ -3,6 +3,9 @@
 #![allow(dead_code, reason = "the files have parts that only the program uses")]
 
 #[path = "../../../host/src/account.rs"]
+// Files of `nirspi-serve` name the crate `nirspi`.
+extern crate self as nirspi;
+
 pub mod account;
 
 pub mod recording;

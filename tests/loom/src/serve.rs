@@ -1,8 +1,8 @@
-//! As `nirspi::serve`.
+//! As `nirspi_serve`.
 
-#[path = "../../../host/src/serve/light.rs"]
+#[path = "../../../host/serve/src/light.rs"]
 pub mod light;
-#[path = "../../../host/src/serve/slot.rs"]
+#[path = "../../../host/serve/src/slot.rs"]
 pub mod slot;
 
 use loom::sync::{Mutex, MutexGuard};

@@ -22,7 +22,7 @@ import check
 import links
 import people
 
-PAGE = pathlib.Path(__file__).parents[3] / "src/serve/page"
+PAGE = pathlib.Path(__file__).parents[3] / "serve/src/page"
 # A part that passes takes less on a busy machine.
 LIMIT_MS = 8_000
 

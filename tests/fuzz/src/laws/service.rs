@@ -1,8 +1,8 @@
 //! What a page, a script or any client sends to the live page's servers.
 
 use crate::{Law, MIB, is_one_line, read, seeds};
-use nirspi::serve::fuzzing::{Place, Still, TOKEN};
-use nirspi::serve::settings::{Change, MAX_FRAMES, MAX_SWEEPS, Offer, Settings};
+use nirspi_serve::fuzzing::{Place, Still, TOKEN};
+use nirspi_serve::settings::{Change, MAX_FRAMES, MAX_SWEEPS, Offer, Settings};
 use nirspi_recon::reconstruct::Method;
 use std::cell::RefCell;
 
@@ -10,7 +10,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "changes",
         reads: "a change of the settings (JSON)",
-        readers: &["host/src/serve/settings.rs"],
+        readers: &["host/serve/src/settings.rs"],
         holds: changes,
         seeds: change_seeds,
         longest: 1024,
@@ -20,13 +20,13 @@ pub const LAWS: &[Law] = &[
         name: "http",
         reads: "any bytes on a connection to the page, without a token and with one",
         readers: &[
-            "host/src/serve/http.rs",
-            "host/src/serve/guard.rs",
-            "host/src/serve/token.rs",
-            "host/src/serve/connections.rs",
-            "host/src/serve/commands.rs",
-            "host/src/serve/stage.rs",
-            "host/src/serve/page.rs",
+            "host/serve/src/http.rs",
+            "host/serve/src/guard.rs",
+            "host/serve/src/token.rs",
+            "host/serve/src/connections.rs",
+            "host/serve/src/commands.rs",
+            "host/serve/src/stage.rs",
+            "host/serve/src/page.rs",
         ],
         holds: http,
         seeds: http_seeds,

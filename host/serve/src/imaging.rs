@@ -1,0 +1,497 @@
+//! Imaging of a page: takes the newest frames, reconstructs and enhances their image, and makes the
+//! state for pages.
+
+use super::delays::Passed;
+use super::line::Line;
+use super::look::{DepthImage, Look};
+use super::moving::Moving;
+use super::settings::{Offer, Settings, alternatives};
+use super::state::{Light, Offered, Published, Rate, Rates, State};
+use super::{Shared, lock};
+use nirspi::account::LossCounters;
+use nirspi::calibration::FlatField;
+use nirspi::causes;
+use nirspi::clock::{self, Instant};
+use nirspi::imaging::{Enhance, EnhanceError, SteadyWhite, Warning, White, enhance_frame};
+use nirspi::integrate::IntegrateError;
+use nirspi_nets::deblur::Model;
+use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
+use nirspi_recon::reconstruct::{
+    Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Setting, Stacked,
+    Strength,
+};
+use nirspi_recon::{Measurements, Side};
+use serde::Serialize;
+use std::sync::{Arc, Mutex};
+use thiserror::Error;
+
+/// Why the newest frames gave no picture.
+#[derive(Debug, Error)]
+enum PictureError {
+    /// The settings name a method that does not exist.
+    #[error("there is no method {0}")]
+    Method(&'static str),
+    /// The frames give no measurements.
+    #[error(transparent)]
+    Measurements(#[from] IntegrateError),
+    /// The method gives no image.
+    #[error(transparent)]
+    Reconstruct(#[from] ReconstructError),
+    /// The image does not have the instrument's size, or has a pixel that is not finite.
+    #[error("the frames gave no image of finite numbers")]
+    NotFinite,
+    /// The weights of the network are damaged.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// The networks refuse the image.
+    #[error(transparent)]
+    Enhance(#[from] EnhanceError),
+}
+
+/// Why methods and networks cannot be prepared.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ImagingError {
+    /// A method of reconstruction.
+    #[error(transparent)]
+    Method(#[from] ReconstructError),
+    /// The built-in weights.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// The method makes each image by itself.
+    #[error(
+        "{method} makes each image by itself; {} can start from the images before",
+        alternatives(.methods)
+    )]
+    WarmStart {
+        /// The method.
+        method: &'static str,
+        /// The methods whose images can start from the images before.
+        methods: Vec<&'static str>,
+    },
+}
+
+/// The methods and networks that make images.
+pub struct Imaging {
+    settings: MethodSettings,
+    methods: Vec<Prepared>,
+    device: Device,
+    models: Vec<Model>,
+    /// The learned stages with the network of this name.
+    enhance: (&'static str, Enhance),
+}
+
+/// Number of pictures after which a method that chooses among others chooses again: some seconds of a
+/// live view.
+const CHOSEN_EVERY: u32 = 100;
+
+/// A method of reconstruction that is ready.
+struct Prepared {
+    name: &'static str,
+    method: Box<dyn Reconstruct>,
+    /// The method of the library's list, and the strength for which it is prepared, if it has one.
+    built_in: Option<(Method, Option<f64>)>,
+}
+
+impl Imaging {
+    /// Every method of the library's list with these settings, and the built-in networks on this
+    /// device. A network that needs many steps for one image is left out.
+    ///
+    /// # Errors
+    /// [`ImagingError`] if a setting is out of range, or the built-in weights are damaged.
+    pub fn new(settings: &MethodSettings, device: Device) -> Result<Self, ImagingError> {
+        let strength = strength_of(settings);
+        let ready = |method: &Method| {
+            let name = method.argument();
+            let prepared = method.prepare(&settings.taken_by(*method))?;
+            let built_in = Some((*method, strength.filter(|_| method.takes(Setting::Strength))));
+            let method: Box<dyn Reconstruct> =
+                Box::new(Stacked::chosen_every(CHOSEN_EVERY, prepared));
+            Ok(Prepared { name, method, built_in })
+        };
+        let methods = Method::ALL.iter().map(ready).collect::<Result<_, ReconstructError>>()?;
+        let mut networks = Networks::built_in(device.clone());
+        let mut is_live = |model: &Model| {
+            model.default_steps().get() == 1 && networks.weights(model.name()).is_ok()
+        };
+        let models = Model::ALL.into_iter().filter(|model| is_live(model)).collect();
+        let model = Network::default().model();
+        let enhance = (model.name(), Enhance::by(model.into(), &device)?);
+        Ok(Self { settings: settings.clone(), methods, device, models, enhance })
+    }
+
+    /// The same with a method of your own. Pages offer the method by this name.
+    #[must_use]
+    pub fn with_method(mut self, name: &'static str, method: Box<dyn Reconstruct>) -> Self {
+        self.methods.push(Prepared { name, method, built_in: None });
+        self
+    }
+
+    /// What pages can choose.
+    pub(super) fn offer(&self) -> Offer {
+        let with_strength = |prepared: &&Prepared| {
+            prepared.built_in.is_some_and(|(method, _)| method.takes(Setting::Strength))
+        };
+        let with_warm_start =
+            |prepared: &&Prepared| matches!(prepared.method.begin_video(), Ok(Some(_)));
+        let about =
+            |prepared: &Prepared| prepared.built_in.map_or("", |(method, _)| method.about());
+        Offer {
+            methods: self.methods.iter().map(|prepared| prepared.name).collect(),
+            about: self.methods.iter().map(about).collect(),
+            with_strength: self.methods.iter().filter(with_strength).map(|p| p.name).collect(),
+            with_warm_start: self.methods.iter().filter(with_warm_start).map(|p| p.name).collect(),
+            models: self.models.iter().map(|model| model.name()).collect(),
+            ..Offer::default()
+        }
+    }
+
+    /// Whether the images of the method of this name can start from the images before. A command
+    /// line is refused if they cannot; pages ignore a setting that the method does not use.
+    ///
+    /// # Errors
+    /// [`ImagingError::WarmStart`] if the method makes each image by itself, and
+    /// [`ImagingError::Method`] if the method's settings allow no video.
+    pub fn check_warm_start(&self, method: &'static str) -> Result<(), ImagingError> {
+        let chosen = self.methods.iter().find(|prepared| prepared.name == method);
+        match chosen.map(|prepared| prepared.method.begin_video()).transpose()?.flatten() {
+            Some(_) => Ok(()),
+            None => {
+                let methods = self.offer().with_warm_start;
+                Err(ImagingError::WarmStart { method, methods })
+            }
+        }
+    }
+
+    /// The method that these settings choose, prepared for their strength.
+    fn method(&mut self, settings: &Settings) -> Result<&dyn Reconstruct, PictureError> {
+        let mut all = self.methods.iter_mut();
+        let prepared = all
+            .find(|prepared| prepared.name == settings.method)
+            .ok_or(PictureError::Method(settings.method))?;
+        if let Some((method, strength)) = &mut prepared.built_in
+            && method.takes(Setting::Strength)
+            && *strength != settings.strength
+        {
+            let wanted = settings.strength.map_or_else(Strength::default, Strength::Fixed);
+            let with = MethodSettings { strength: wanted, ..self.settings.clone() };
+            prepared.method = method.prepare(&with.taken_by(*method))?;
+            *strength = settings.strength;
+        }
+        Ok(prepared.method.as_ref())
+    }
+
+    /// The learned stages with the network that these settings choose.
+    fn enhance(&mut self, settings: &Settings) -> Result<&Enhance, PictureError> {
+        if self.enhance.0 != settings.model {
+            let mut models = self.models.iter();
+            if let Some(model) = models.find(|model| model.name() == settings.model) {
+                self.enhance = (model.name(), Enhance::by((*model).into(), &self.device)?);
+            }
+        }
+        Ok(&self.enhance.1)
+    }
+}
+
+/// The strength of these settings; `None` if it is chosen by the measurements.
+fn strength_of(settings: &MethodSettings) -> Option<f64> {
+    match settings.strength {
+        Strength::Fixed(strength) => Some(strength),
+        Strength::CrossValidated { .. } => None,
+    }
+}
+
+/// The images of one state, and their properties.
+#[derive(Debug, Serialize)]
+pub struct Picture {
+    /// The first image has number 1, each further one the next number.
+    pub number: u64,
+    /// The reconstructed image, (32, 32) ADC counts.
+    #[serde(skip)]
+    pub counts: Vec<f32>,
+    /// The enhanced image, (64, 64) in [0, 1], with white at 1.
+    #[serde(skip)]
+    pub enhanced: Option<Vec<f32>>,
+    /// Half-width of the 95 % interval of each pixel of the enhanced image; `None` for a network
+    /// without calibrated intervals.
+    #[serde(skip)]
+    pub half_width: Option<Vec<f32>>,
+    /// The readings, (32, 32) ADC counts: that of Hadamard row `32 r + c` at (r, c); NaN for a row
+    /// that was not measured.
+    #[serde(skip)]
+    pub readings: Vec<f32>,
+    /// The depth map that was fused.
+    #[serde(skip)]
+    pub depth: Option<Arc<DepthImage>>,
+    /// When the newest frame came out of the link.
+    #[cfg(feature = "server")]
+    #[serde(skip)]
+    pub arrived: Instant,
+    /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
+    pub arrived_unix_ms: u64,
+    method: &'static str,
+    /// Name of the patterns' order.
+    order: String,
+    /// Number of patterns shown.
+    patterns: usize,
+    /// Sweeps summed into one frame.
+    sweeps: u32,
+    /// The loss counters of the image's run, with its newest frame.
+    run_frames: LossCounters,
+    /// What the image takes from the images before, in words; `null` if it takes nothing.
+    past: Option<String>,
+    /// Number of summed frames.
+    frames: u64,
+    /// ADC counts of one pixel that were used as white.
+    white_counts: f32,
+    reconstruct_ms: f64,
+    /// The results of the learned stages; `null` if they are switched off.
+    enhancement: Option<Enhancement>,
+    /// Reasons not to trust the images: the frames' flags, and the results of the learned stages.
+    warnings: Vec<String>,
+    /// The warnings of the frames' flags, for the image itself.
+    frame_warnings: Vec<&'static str>,
+    /// Short forms of the learned stages' warnings, for the enhanced image itself.
+    short_warnings: Vec<&'static str>,
+}
+
+impl Picture {
+    /// The reconstructed image, (32, 32) in [0, 1], with white at 1.
+    #[cfg(feature = "server")]
+    pub fn shares_of_white(&self) -> Vec<f32> {
+        let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
+        self.counts.iter().map(|value| (value * scale).clamp(0.0, 1.0)).collect()
+    }
+}
+
+#[cfg(fuzzing)]
+impl Picture {
+    /// A picture of these counts, of which 2 are white.
+    pub fn of_counts(number: u64, counts: Vec<f32>, enhanced: Option<Vec<f32>>) -> Self {
+        Self {
+            number,
+            counts,
+            enhanced,
+            half_width: None,
+            readings: Vec::new(),
+            depth: None,
+            arrived: Instant::now(),
+            arrived_unix_ms: clock::since_1970().as_millis() as u64,
+            method: "hadamard",
+            order: String::new(),
+            patterns: 1024,
+            sweeps: 1,
+            run_frames: LossCounters::default(),
+            past: None,
+            frames: 1,
+            white_counts: 2.0,
+            reconstruct_ms: 0.0,
+            enhancement: None,
+            warnings: Vec::new(),
+            frame_warnings: Vec::new(),
+            short_warnings: Vec::new(),
+        }
+    }
+}
+
+/// The results of the learned stages.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Enhancement {
+    /// The network that deblurred.
+    model: &'static str,
+    /// Estimated blur in pixels of the 64 x 64 grid.
+    blur_px: f32,
+    /// Estimated noise of a pixel; white is 1.
+    noise: f32,
+    /// Distance of the image from that of the result, divided by its noise. A value near 1 or below
+    /// means that the readings support the result.
+    inconsistency: f32,
+    /// Whether a depth map was fused.
+    depth: bool,
+    enhance_ms: f64,
+}
+
+/// What pages are told of the images.
+pub(super) struct Told {
+    picture: Option<Arc<Picture>>,
+    problem: Option<String>,
+    frames: Rate,
+    images: Rate,
+    /// Number of states.
+    states: u64,
+}
+
+/// Makes one image after the other, and the state around it.
+///
+/// An image may take long. What pages are told of it is behind a lock of its own, so that another
+/// thread can make states meanwhile.
+pub(super) struct Studio {
+    imaging: Imaging,
+    white: SteadyWhite,
+    moving: Moving,
+    told: Arc<Mutex<Told>>,
+}
+
+impl Studio {
+    /// A studio without images.
+    pub(super) fn new(imaging: Imaging) -> Self {
+        let started = Instant::now();
+        let (frames, images) = (Rate::new(started), Rate::new(started));
+        let told = Told { picture: None, problem: None, frames, images, states: 0 };
+        let (white, moving) = (SteadyWhite::default(), Moving::default());
+        Self { imaging, white, moving, told: Arc::new(Mutex::new(told)) }
+    }
+
+    /// What pages are told of the images.
+    pub(super) fn told(&self) -> Arc<Mutex<Told>> {
+        Arc::clone(&self.told)
+    }
+
+    /// Makes the image of a look taken from the slot.
+    pub(super) fn make(&mut self, shared: &Shared, look: &Look) {
+        let mut settings = lock(&shared.settings).clone();
+        settings.enhance &= !shared.shed().enhancement_off;
+        if self.moving.awaits(look, &settings) {
+            let scene = (&mut self.white, &mut self.moving);
+            let made = self.imaging.picture(look, &settings, scene, shared);
+            let told = &mut *lock(&self.told);
+            match made {
+                Ok(made) => (told.picture, told.problem) = (Some(Arc::new(made)), None),
+                Err(why) => told.problem = Some(causes::in_one_line(&why)),
+            }
+            shared.slot.done(told.problem.is_none());
+        } else {
+            shared.slot.leave();
+        }
+    }
+}
+
+impl Told {
+    /// The state of this moment.
+    ///
+    /// # Errors
+    /// Does not occur: every field can be written as JSON.
+    pub(super) fn state(&mut self, shared: &Shared) -> serde_json::Result<Published> {
+        let now = Instant::now();
+        let ledger = shared.slot.ledger();
+        let rates = Rates {
+            camera_frames_per_s: self.frames.at(now, ledger.frames.received),
+            images_per_s: self.images.at(now, ledger.images.shown),
+        };
+        let settings = lock(&shared.settings).clone();
+        // The log is copied, so that the camera's thread can add to the log meanwhile.
+        let mut log = lock(&shared.camera).clone();
+        log.camera.age(now);
+        let (allowed, commands) = shared.light.position();
+        self.states += 1;
+        let state = State {
+            number: self.states,
+            program: env!("CARGO_PKG_VERSION"),
+            camera: &log.camera,
+            light: Light { allowed, commands },
+            ledger,
+            rates,
+            settings: &settings,
+            offered: Offered::new(&shared.offer),
+            picture: self.picture.as_deref(),
+            problem: self.problem.as_deref(),
+            scene: shared.stage.state(),
+            line: shared.line.as_ref().map(Line::state),
+            viewers: shared.viewers(),
+            delays: lock(&shared.delays).state(now),
+            overload: lock(&shared.overload).state(),
+            events: log.events(),
+        };
+        Published::new(&state, self.picture.as_ref(), shared.stage.drawing().as_deref())
+    }
+}
+
+impl Imaging {
+    /// The images of the newest frames.
+    fn picture(
+        &mut self,
+        look: &Look,
+        settings: &Settings,
+        (white, moving): (&mut SteadyWhite, &mut Moving),
+        shared: &Shared,
+    ) -> Result<Picture, PictureError> {
+        let started = Instant::now();
+        let measurements =
+            look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
+        let method = self.method(settings)?;
+        let made = moving.image(method, &measurements, look, settings)?;
+        let flat_field = look.run.flat_field.as_ref();
+        let for_networks = settings
+            .enhance
+            .then(|| FlatField::corrected(flat_field, made.with_readings(&measurements)));
+        let Reconstruction { image, report } = made;
+        let image = FlatField::corrected(flat_field, image);
+        let reconstruct_ms = ms_since(started);
+        let side = image.side().pixels();
+        if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
+            return Err(PictureError::NotFinite);
+        }
+        shared.passed(Passed::Reconstructed, look.arrived);
+        let white_counts = white.follow(White::Brightest.level(&image));
+        let frame_warnings = look.sum.warnings();
+        let mut all: Vec<String> = frame_warnings.iter().map(|&text| text.to_owned()).collect();
+        let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
+        let mut half_width = None;
+        if let Some(given) = for_networks.filter(|_| white_counts > 0.0) {
+            let started = Instant::now();
+            let depth = look.depth.as_ref().map(|depth| &depth.map);
+            let (enhance, rows) = (self.enhance(settings)?, measurements.rows());
+            let (made, doubts) = enhance_frame(enhance, &given, rows, white_counts, depth)?;
+            short.extend(doubts.iter().map(Warning::short));
+            all.extend(doubts.iter().map(Warning::to_string));
+            enhancement = Some(Enhancement {
+                model: settings.model,
+                blur_px: made.blur_px,
+                noise: made.noise,
+                inconsistency: made.inconsistency,
+                depth: look.depth.is_some(),
+                enhance_ms: ms_since(started),
+            });
+            (enhanced, half_width) = (Some(made.pixels), made.half_width);
+            shared.passed(Passed::Enhanced, look.arrived);
+        }
+        Ok(Picture {
+            number: shared.slot.ledger().images.shown + 1,
+            counts: image.pixels().to_vec(),
+            enhanced,
+            half_width,
+            readings: readings(&measurements),
+            depth: look.depth.clone(),
+            #[cfg(feature = "server")]
+            arrived: look.arrived,
+            arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed()))
+                .as_millis() as u64,
+            method: settings.method,
+            order: look.run.setup.order.clone(),
+            patterns: look.run.setup.rows.len(),
+            sweeps: look.run.setup.sweeps,
+            run_frames: look.counters,
+            past: report.warm.then(|| report.note.unwrap_or_default()),
+            frames: look.sum.frames(),
+            white_counts,
+            reconstruct_ms,
+            enhancement,
+            warnings: all,
+            frame_warnings,
+            short_warnings: short,
+        })
+    }
+}
+
+/// The measurements by Hadamard row; NaN for a row that was not measured.
+fn readings(measurements: &Measurements) -> Vec<f32> {
+    let mut readings = vec![f32::NAN; measurements.side().area()];
+    for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
+        readings[row as usize] = value as f32;
+    }
+    readings
+}
+
+fn ms_since(started: Instant) -> f64 {
+    started.elapsed().as_secs_f64() * 1e3
+}
