@@ -156,7 +156,6 @@ step_rtl() { cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl; }
 # not check them again.
 step_features() {
     cargo clippy --locked -p nirspi --no-default-features -- -D warnings
-    cargo clippy --locked -p nirspi -p nirspi-tests-features --no-default-features --features nirspi/training -- -D warnings
     cargo clippy --locked -p nirspi-serve -p nirspi-tests-features --no-default-features -- -D warnings
 }
 
@@ -217,7 +216,7 @@ step_release_folder() {
     # The ELF that is released is the one that has run.
     if [ -f target/silicon.sha256 ]; then sha256sum --check target/silicon.sha256; fi
     [ -f target/gateware/ecp5-evn/nirspi.bit ] || step_seeds
-    cargo run --locked -p nirspi --no-default-features --example release_folder -- target/package/firmware
+    cargo run --locked -p nirspi-update --example release_folder -- target/package/firmware
     ls -l target/package/firmware
 }
 
@@ -450,8 +449,7 @@ step_dissector() {
 
 step_flash() {
     # Without optimisation and GPUs: it is built for this alone.
-    cargo test --locked -p nirspi --no-default-features --features flash --lib \
-        --config 'profile.dev.package."*".opt-level=0' -- boards flash
+    cargo test --locked -p nirspi-update --features flash --lib --config 'profile.dev.package."*".opt-level=0' -- flash
 }
 
 step_mie() {

@@ -36,7 +36,7 @@ PLACES = [
     (
         "camera descriptions",
         [("nirspi-tests", "mutated_files", "camera_descriptions")],
-        ["host/src/virtual_camera/model.rs"],
+        ["host/virtual/src/model.rs"],
     ),
     (
         "calibrations",

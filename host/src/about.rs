@@ -5,15 +5,6 @@ use nirspi_nets::embedded::ShippedWeights;
 use nirspi_wire::version;
 use std::fmt;
 
-/// Features of this library, and whether this build has each one.
-const FEATURES: [(&str, bool); 5] = [
-    ("baselines", cfg!(feature = "baselines")),
-    ("flash", cfg!(feature = "flash")),
-    ("gpu", cfg!(feature = "gpu")),
-    ("hdf5", cfg!(feature = "hdf5")),
-    ("wgpu", cfg!(feature = "wgpu")),
-];
-
 /// A build of this library, and of the program around it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -24,22 +15,26 @@ pub struct About {
     pub commit: Option<&'static str>,
     /// The oldest and the newest protocol version that this build speaks.
     pub protocol: [u16; 2],
-    /// Those of the features `baselines`, `flash`, `gpu`, `hdf5` and `wgpu` that this build has.
-    pub features: Vec<&'static str>,
+    /// The features of the program, and whether this build has each one.
+    pub features: &'static [(&'static str, bool)],
     /// The weights that this build contains; empty if the embedded files are damaged.
     #[cfg(feature = "enhance")]
     pub weights: Vec<ShippedWeights>,
 }
 
 impl About {
-    /// This build. `commit` is that of the sources, if the program's build knows the commit.
+    /// This build. `commit` is that of the sources, if the program's build knows the commit; `features` are the
+    /// program's, and whether it has each one.
     #[must_use]
-    pub fn this_build(commit: Option<&'static str>) -> Self {
+    pub fn this_build(
+        commit: Option<&'static str>,
+        features: &'static [(&'static str, bool)],
+    ) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             commit,
             protocol: [version::MIN, version::CURRENT],
-            features: FEATURES.iter().filter(|(_, has)| *has).map(|(name, _)| *name).collect(),
+            features,
             #[cfg(feature = "enhance")]
             weights: ShippedWeights::all().unwrap_or_default(),
         }
@@ -53,9 +48,13 @@ impl fmt::Display for About {
         let unknown = "not known: a debug build, or built without git";
         writeln!(f, "commit: {}", self.commit.unwrap_or(unknown))?;
         writeln!(f, "protocol: {}", version::Spoken)?;
-        match self.features.is_empty() {
-            true => write!(f, "features: none of {}", FEATURES.map(|(name, _)| name).join(", "))?,
-            false => write!(f, "features: {}", self.features.join(", "))?,
+        let names = |wanted: &dyn Fn(bool) -> bool| {
+            let wanted = self.features.iter().filter(|(_, has)| wanted(*has));
+            wanted.map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
+        };
+        match names(&|has| has) {
+            none if none.is_empty() => write!(f, "features: none of {}", names(&|_| true))?,
+            these => write!(f, "features: {these}")?,
         }
         #[cfg(feature = "enhance")]
         {
@@ -74,17 +73,20 @@ mod tests {
 
     #[test]
     fn a_build_says_its_version_commit_protocol_and_features() {
-        let text = About::this_build(Some("0123456789ab")).to_string();
+        const FEATURES: [(&str, bool); 2] = [("flash", false), ("gpu", true)];
+        let text = About::this_build(Some("0123456789ab"), &FEATURES).to_string();
         let protocol = format!("\nprotocol: {}\n", version::Spoken);
         assert!(text.starts_with(concat!(env!("CARGO_PKG_VERSION"), "\ncommit: 0123456789ab\n")));
-        assert!(text.contains(&protocol) && text.contains("\nfeatures: "), "{text}");
-        assert!(About::this_build(None).to_string().contains("built without git"));
+        assert!(text.contains(&protocol) && text.contains("\nfeatures: gpu\n"), "{text}");
+        let without = About::this_build(None, &[("flash", false)]).to_string();
+        assert!(without.contains("\nfeatures: none of flash\n"), "{without}");
+        assert!(without.contains("built without git"));
     }
 
     #[test]
     #[cfg(feature = "enhance")]
     fn every_network_of_the_chain_is_listed_with_a_checksum() {
-        let about = About::this_build(None);
+        let about = About::this_build(None, &[]);
         let listed = |model| about.weights.iter().any(|w| w.model == model && w.sha256.len() == 64);
         assert!(
             ["estimator", "fsrcnn", "diffusion", "prior", "classifier"].into_iter().all(listed)

@@ -45,8 +45,6 @@ pub fn is_simulated(board: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    #[cfg(feature = "flash")]
-    use std::io::Write;
 
     const HARDWARE: &str = "title = \"Toy\"\nkind = \"hardware\"\nprocessor = \"P1\"\ntarget = \"thumb\"\n\
         host_link = \"USB\"\nfpga_link = \"SPI\"\nstate = \"built\"\nflash_bytes = 65_536\nstatic_bytes = 20\n\
@@ -98,20 +96,5 @@ mod tests {
         assert!(is_simulated("mps2-an505"));
         assert!(!is_simulated("nucleo-u5a5zj-q"));
         assert!(!is_simulated("a board of somebody else"));
-    }
-
-    /// Runs only with the feature `flash`: `cargo test -p nirspi --features flash boards`.
-    #[cfg(feature = "flash")]
-    #[test]
-    fn every_chip_is_one_that_probe_rs_knows() {
-        let registry = probe_rs::config::Registry::from_builtin_families();
-        for board in BOARDS {
-            let Some(chip) = board.chip else {
-                let _ = writeln!(std::io::stderr(), "skipped: {} has no chip", board.name);
-                continue;
-            };
-            let target = registry.get_target_by_name(chip).unwrap();
-            assert_eq!(target.name, chip, "probe-rs spells it so");
-        }
     }
 }

@@ -21,22 +21,18 @@
 //!   [`check`] of a camera,
 //! * [`recording`] stores a measurement, [`replay`] plays it back as a camera, [`capture`] runs a
 //!   measurement and chooses its calibration, [`export`] writes it for other programs,
-//! * [`address`] opens the camera at an address, [`devices`] lists cameras, [`gateware`] loads a camera's
-//!   FPGA, [`update`] brings a camera to the versions of a release, [`udev`] gives users access to cameras
-//!   on USB; with the feature `flash`, `flash` programs the boards,
-//! * [`picture`] draws, [`scene`] is what a camera looks at, [`resolution`] measures the finest detail,
-//!   [`legibility`] reads characters,
+//! * [`address`] opens the camera at an address, [`devices`] lists cameras, [`udev`] gives users access to
+//!   cameras on USB,
+//! * [`picture`] draws, [`scene`] is what a camera looks at, [`depth_image`] what its depth sensor sees in
+//!   its image,
 //! * [`source`] reads measurements from a file, a recording or a capture, `nirspi-recon` reconstructs
 //!   images, [`imaging`] scales, enhances and judges them and gives warnings, [`reconstruct`] makes an
-//!   image or many of what was read,
-//! * [`virtual_camera`] is a camera without hardware: optics simulator, gateware model, real firmware
-//!   logic; [`example`] makes example measurements, [`training`] pairs for training networks,
-//!   [`safety_case`] says what eye and skin receive and what each fault leaves lit.
+//!   image or many of what was read.
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and
-//! reads measurements, without typefaces, optics or networks. The features `enhance`, `pictures`,
-//! `virtual-camera` and `training` add the other parts; `gpu` adds the kernels for GPUs. The live page is
-//! the crate `nirspi-serve`.
+//! reads measurements, without typefaces or networks. The features `enhance` and `pictures` add these;
+//! `gpu` adds the kernels for GPUs. The virtual camera is the crate `nirspi-virtual`, the live page
+//! `nirspi-serve`, updates of a camera `nirspi-update`, how good the camera is `nirspi-eval`.
 
 #![cfg_attr(
     target_family = "wasm",
@@ -53,29 +49,21 @@ pub mod capture;
 pub mod causes;
 pub mod check;
 pub mod clock;
-#[cfg(feature = "virtual-camera")]
 pub mod depth_image;
 #[cfg(not(target_family = "wasm"))]
 pub mod devices;
 pub mod events;
-#[cfg(all(feature = "virtual-camera", not(target_family = "wasm")))]
-pub mod example;
 #[cfg(not(target_family = "wasm"))]
 pub mod export;
 pub mod exposure;
 pub mod files;
-#[cfg(feature = "flash")]
-pub mod flash;
 pub mod fpga;
 pub mod frame_time;
-pub mod gateware;
 pub mod heartbeat;
 pub mod identity;
 pub mod imaging;
 pub mod info;
 pub mod integrate;
-#[cfg(feature = "training")]
-pub mod legibility;
 pub mod link;
 #[cfg(feature = "pictures")]
 pub mod picture;
@@ -84,10 +72,7 @@ pub mod provenance;
 pub mod reconstruct;
 pub mod recording;
 pub mod replay;
-pub mod resolution;
 pub mod response;
-#[cfg(feature = "virtual-camera")]
-pub mod safety_case;
 #[cfg(feature = "pictures")]
 pub mod scene;
 pub mod selftest;
@@ -98,12 +83,5 @@ pub mod signal;
 pub mod source;
 pub mod stage_times;
 pub mod tally;
-#[cfg(feature = "training")]
-pub mod training;
 pub mod udev;
-pub mod update;
 pub mod versions;
-#[cfg(feature = "virtual-camera")]
-pub mod virtual_camera;
-#[cfg(feature = "virtual-camera")]
-pub mod weather;

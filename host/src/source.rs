@@ -528,10 +528,10 @@ fn as_they_are(rows: &Rows, readings: &Readings) -> Result<Reading, MeasurementE
     Ok(Reading { measurements, dropouts, outliers, doubts, dark_level })
 }
 
-#[cfg(all(test, feature = "training"))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{encode_archive, npy};
+    use crate::files::{archive, npy};
 
     #[test]
     fn more_measurements_than_the_memory_holds_are_refused_by_their_number() {
@@ -543,7 +543,7 @@ mod tests {
             ("h_row", npy::encode(&[1], &[0.0_f32])),
             ("d", npy::encode(&[8_000_000, 1], &vec![0.0_f32; 8_000_000])),
         ];
-        std::fs::write(&path, encode_archive(&path, &members).unwrap()).unwrap();
+        std::fs::write(&path, archive::encode(&path, &members).unwrap()).unwrap();
         let error = Source::read_all(&path, &SourceOptions::default()).unwrap_err().to_string();
         assert!(error.contains("8000000 measurements, expected at most"), "{error}");
         assert!(error.contains("--index N") && error.lines().count() == 1, "{error}");

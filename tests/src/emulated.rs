@@ -4,7 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a failed unwrap here fails the test that uses it")]
 
 use nirspi::link::{Link, TcpLink};
-use nirspi::virtual_camera::{SimulatedFpga, serve_tunnel};
+use nirspi_virtual::{SimulatedFpga, serve_tunnel};
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};

@@ -3,8 +3,8 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::virtual_camera::{OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
+use nirspi_virtual::{OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{
     Command, Configuration, Deframed, Deframer, DeviceMessage, EventKind, Fault, PatternOrder,

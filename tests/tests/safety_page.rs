@@ -3,7 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::safety_case::{DarkAfter, FAULTS, SafetyCase};
+use nirspi_eval::safety_case::{DarkAfter, FAULTS, SafetyCase};
 use nirspi_optics::CameraModel;
 use nirspi_tests::root;
 use std::path::Path;

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 pub use nirspi::address::CameraAddress;
 use nirspi::link::Link;
 use nirspi::session::Session;
-use nirspi::virtual_camera::MemoryLink;
+use nirspi_virtual::MemoryLink;
 
 /// Opens a session with the camera, and prints its earlier reports. `scene` is the scene of a
 /// virtual camera.

@@ -9,10 +9,10 @@ use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{CameraModel, VirtualOptics, read_camera_model};
-use nirspi::weather::{WeatherError, read_weather};
 use nirspi_optics::rain::{Air, Rainfall};
 use nirspi_recon::{Order, Sampling};
+use nirspi_virtual::weather::{WeatherError, read_weather};
+use nirspi_virtual::{CameraModel, VirtualOptics, read_camera_model};
 use std::path::Path;
 use std::str::FromStr;
 

@@ -3,8 +3,8 @@
 use super::print;
 use super::report::ReportArgs;
 use anyhow::Result;
-use nirspi::virtual_camera::read_camera_model;
 use nirspi_eval::camera_model::{Report, camera_model};
+use nirspi_virtual::read_camera_model;
 use std::process::ExitCode;
 
 /// Say what follows from a camera description: field, light, noise, eye safety; or print the description
@@ -41,7 +41,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// The shipped file of this name, if the file is complete. Other shipped files have only the
 /// differences.
 fn camera_with_remarks(name: &str) -> Option<&'static str> {
-    nirspi::virtual_camera::CameraModel::shipped_text(name).filter(|text| !text.contains("\nbasis"))
+    nirspi_virtual::CameraModel::shipped_text(name).filter(|text| !text.contains("\nbasis"))
 }
 
 fn say(report: &Report) -> Result<()> {

@@ -17,12 +17,12 @@ use nirspi::identity::CameraIdentity;
 use nirspi::imaging::{KnownReadings, MethodReport, Quality, score, share_of_white};
 use nirspi::picture::Pictures;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{
+use nirspi_recon::words::{count, count_of};
+use nirspi_recon::{Image, Measurements, Sampling, reconstruct};
+use nirspi_virtual::{
     CameraModel, Panels, SCENE_PX, Stages, StagesReport, calibrate_against_white, enhance_stages,
     flat_field_against_white, shoot, white_level_at_target,
 };
-use nirspi_recon::words::{count, count_of};
-use nirspi_recon::{Image, Measurements, Sampling, reconstruct};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -3,9 +3,9 @@
 use super::report::{Overwrite, words};
 use super::{Usage, print, provenance};
 use anyhow::Result;
-use nirspi::example::Example;
 use nirspi::files::measurement;
 use nirspi::files::output::{Existing, write_result};
+use nirspi_virtual::example::Example;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

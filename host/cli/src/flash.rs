@@ -72,7 +72,7 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
     use nirspi::files::read_at_most;
 
     let Some((board, chip)) = board else {
-        let found = nirspi::flash::probes();
+        let found = nirspi_update::flash::probes();
         if found.is_empty() {
             print::line("no debug probe: plug in the board's ST-LINK connector")?;
         }
@@ -104,7 +104,7 @@ fn act(args: &Args, board: Option<(&'static Board, &'static str)>) -> Result<Exi
 pub fn write(chip: &str, elf: &Path, firmware: &[u8], probe: Option<&str>) -> Result<()> {
     use super::progress::Progress;
     use anyhow::Context;
-    use nirspi::flash::{Step, choose, flash, probes};
+    use nirspi_update::flash::{Step, choose, flash, probes};
 
     let found = probes();
     let probe = choose(&found, probe)?;

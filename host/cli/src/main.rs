@@ -54,8 +54,17 @@ use nirspi_eval::EvalError;
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
+/// The features of this program, and whether this build has each one.
+const FEATURES: &[(&str, bool)] = &[
+    ("baselines", cfg!(feature = "baselines")),
+    ("flash", cfg!(feature = "flash")),
+    ("gpu", cfg!(feature = "gpu")),
+    ("hdf5", cfg!(feature = "hdf5")),
+    ("wgpu", cfg!(feature = "wgpu")),
+];
+
 static VERSION: LazyLock<String> =
-    LazyLock::new(|| About::this_build(option_env!("NIRSPI_COMMIT")).to_string());
+    LazyLock::new(|| About::this_build(option_env!("NIRSPI_COMMIT"), FEATURES).to_string());
 
 /// An open near-infrared single-pixel camera: capture, virtual camera, reconstruction.
 #[derive(Debug, Parser)]

@@ -8,11 +8,11 @@ use anyhow::{Context, Result};
 use nirspi::files::output::OutputDir;
 use nirspi::files::table::Table;
 use nirspi::picture::signed_png;
-use nirspi::weather::{is_drop_file, read_drops};
 use nirspi_eval::rain::budget::{self, Settings, Term};
 use nirspi_eval::rain::{self, RainReport, curves, rig};
 use nirspi_optics::mie::Index;
 use nirspi_optics::rain::{DropLaw, Drops, PaperRain};
+use nirspi_virtual::weather::{is_drop_file, read_drops};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

@@ -3,8 +3,8 @@
 use super::print;
 use super::report::ReportArgs;
 use anyhow::{Context, Result};
-use nirspi::safety_case::SafetyCase;
-use nirspi::virtual_camera::read_camera_model;
+use nirspi_eval::safety_case::SafetyCase;
+use nirspi_virtual::read_camera_model;
 use std::process::ExitCode;
 
 /// Say what eye and skin receive from a camera's LEDs, and what each single fault leaves lit, for how long

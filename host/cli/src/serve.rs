@@ -12,7 +12,6 @@ use nirspi::exposure::Light;
 use nirspi::files::{interrupt, read_small_text};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::MemoryLink;
 use nirspi_nets::Device;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::{Sampling, Side};
@@ -21,6 +20,7 @@ use nirspi_serve::{
     Access, BasePath, CameraSource, Connect, Connected, HostName, Imaging, Server, StagedScene,
     Token, serve,
 };
+use nirspi_virtual::MemoryLink;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -4,7 +4,7 @@ use super::camera::SceneArgs;
 use super::print;
 use anyhow::{Context, Result};
 use nirspi::files::interrupt;
-use nirspi::virtual_camera::{
+use nirspi_virtual::{
     PrecomputedFpga, ServeOptions, SimulatedFpga, VirtualCamera, serve, serve_tunnel,
 };
 use std::net::{TcpListener, TcpStream};

@@ -5,7 +5,7 @@ use super::progress::Progress;
 use super::report::ReportArgs;
 use super::{flash, gateware, print};
 use anyhow::{Context, Result};
-use nirspi::update::{Plan, Release, await_firmware, load_gateware};
+use nirspi_update::{Plan, Release, await_firmware, load_gateware};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -128,12 +128,12 @@ macro_rules! from_libraries {
 
 from_libraries!(
     nirspi::integrate::IntegrateError,
-    nirspi::legibility::LegibilityError,
+    crate::legibility::LegibilityError,
     nirspi::scene::SceneError,
     nirspi::source::SourceError,
-    nirspi::training::TrainingCameraError,
-    nirspi::virtual_camera::ShotError,
-    nirspi::virtual_camera::VirtualOpticsError,
+    crate::training::TrainingCameraError,
+    nirspi_virtual::ShotError,
+    nirspi_virtual::VirtualOpticsError,
     nirspi_nets::EnhanceError,
     nirspi_nets::MeasuredRowsError,
     nirspi_nets::classical::ClassicalError,

@@ -19,31 +19,40 @@
 //! | [`mod@bench`] | how many frames a second does this machine reconstruct and enhance? |
 //! | [`camera_model`] | what follows from a camera description? |
 //! | [`rain`] | what does rain do to light, and to the photon budget of a pixel? |
+//! | [`safety_case`] | what do eye and skin receive, and what does each fault leave lit? |
 //!
 //! [`shot`] takes the pictures of the tables through the virtual camera, of targets in several
 //! [`typefaces`]. [`pictures`] enhances the pictures. [`bootstrap`] and [`estimate`] give the
-//! uncertainty of a figure.
+//! uncertainty of a figure, [`legibility`] reads characters and [`resolution`] measures the finest detail.
+//! [`training`] makes pairs for training networks, of [`characters`] and typefaces.
 
 pub mod bench;
 pub mod bootstrap;
 pub mod camera_model;
+pub mod characters;
 pub mod completion;
 pub mod estimate;
+pub mod legibility;
 pub mod pictures;
 pub mod quality;
 pub mod rain;
 pub mod range;
+pub mod resolution;
+pub mod safety_case;
 pub mod sampling;
 pub mod sets;
 pub mod shot;
 pub mod table1;
 pub mod table3;
 pub mod table4;
+pub mod training;
 pub mod trust;
 pub mod typefaces;
 pub mod video;
 
 mod error;
+#[cfg(test)]
+mod testing;
 
 pub use error::{EvalError, Result};
 

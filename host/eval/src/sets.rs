@@ -10,9 +10,9 @@ mod images;
 pub use images::{Align, Scaled, read_images, scaled};
 
 use crate::error::{EvalError, Result};
+use crate::legibility::{Judge, LegibilityError};
 use images::outside;
 use nirspi::files::npy::{Stack, read_list};
-use nirspi::legibility::{Judge, LegibilityError};
 use nirspi_nets::Weights;
 use nirspi_nets::data::CHARACTERS;
 use nirspi_nets::images::Images;

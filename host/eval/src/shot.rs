@@ -6,11 +6,11 @@ use nirspi::calibration::FlatField;
 use nirspi::capture::{Capture, Progress};
 use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{self, VirtualOptics};
 use nirspi_optics::rain::Air;
 use nirspi_optics::visible::VisibleCamera;
 use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Image, Order, Side, reconstruct};
+use nirspi_virtual::{self, VirtualOptics};
 use std::ops::ControlFlow;
 
 /// The conditions of a picture.
@@ -64,8 +64,8 @@ impl CalibratedCamera {
     pub fn new(model: &CameraModel, seed: u64) -> Result<Self> {
         // The scene does not matter, because a white sheet replaces it.
         let optics = VirtualOptics::of(model, Scene::white(), 1e3 * DISTANCES_M[0])?;
-        let settling = virtual_camera::calibrate_against_white(&optics, seed)?;
-        let flat_field = virtual_camera::flat_field_against_white(&optics, &settling, seed)?;
+        let settling = nirspi_virtual::calibrate_against_white(&optics, seed)?;
+        let flat_field = nirspi_virtual::flat_field_against_white(&optics, &settling, seed)?;
         Ok(Self { model: model.clone(), settling, flat_field })
     }
 
@@ -133,7 +133,7 @@ impl CalibratedCamera {
     ) -> Result<Capture> {
         let mut watch = |_: &Progress| ControlFlow::Continue(());
         let settling = &self.settling;
-        Ok(virtual_camera::shoot(optics, setup, settling, frames, seed, &mut watch)?.capture)
+        Ok(nirspi_virtual::shoot(optics, setup, settling, frames, seed, &mut watch)?.capture)
     }
 }
 

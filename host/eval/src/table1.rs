@@ -10,12 +10,12 @@ use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi::scene::SceneSource;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::VirtualOptics;
 use nirspi_nets::{Device, Enhancer, Images, Networks, Options};
 use nirspi_optics::rain::Air;
 use nirspi_optics::{Projector, Scene};
 use nirspi_recon::Order;
 use nirspi_recon::reconstruct::{self, OmpSettings};
+use nirspi_virtual::VirtualOptics;
 use serde::Serialize;
 use std::time::Instant;
 

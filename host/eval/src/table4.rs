@@ -11,11 +11,11 @@ use crate::DISTANCES_M;
 use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::pictures::{Enhancers, Picture};
-use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
-use nirspi::picture::{Axis, Chart, Line};
-use nirspi::resolution::{
+use crate::resolution::{
     bar_scene, bar_transfer, disc_transfer, edge_mtf, edge_scene, line_width_px, square_transfer,
 };
+use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
+use nirspi::picture::{Axis, Chart, Line};
 use nirspi_optics::{CameraModel, Projector, Scene};
 use rayon::prelude::*;
 use serde::Serialize;

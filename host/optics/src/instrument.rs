@@ -3,7 +3,7 @@
 //! # Invariant
 //! This crate does not depend on the wire protocol, so the numbers are both in this file and in
 //! `nirspi-wire`. The test `the_optics_have_the_instruments_numbers` of `nirspi`
-//! (`host/src/virtual_camera/mod.rs`) checks that they are equal, and the compiler checks the number
+//! (`host/virtual/src/lib.rs`) checks that they are equal, and the compiler checks the number
 //! of LEDs there.
 
 /// LEDs along one side of the array (paper, section 2.A).

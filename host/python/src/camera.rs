@@ -22,7 +22,7 @@ use nirspi::address::CameraAddress;
 use nirspi::recording::Target;
 use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{MemoryLink, calibrate_against_white, flat_field_against_white};
+use nirspi_virtual::{MemoryLink, calibrate_against_white, flat_field_against_white};
 use numpy::PyArray1;
 use options::Options;
 use pyo3::exceptions::{PyConnectionError, PyOSError};

@@ -9,11 +9,11 @@ use nirspi::link::Link;
 use nirspi::scene::SceneError;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{ShotError, VirtualOpticsError};
 use nirspi_nets::Device;
 use nirspi_optics::CameraModel;
 use nirspi_recon::reconstruct::Method;
 use nirspi_recon::{Order, RowsError};
+use nirspi_virtual::{ShotError, VirtualOpticsError};
 use thiserror::Error;
 
 /// Why a page in turns cannot begin.

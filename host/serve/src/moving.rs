@@ -104,10 +104,10 @@ mod tests {
     use nirspi::integrate::Integrated;
     use nirspi::scene::{SceneMap, SceneSource};
     use nirspi::setup::MeasurementSetup;
-    use nirspi::virtual_camera::{Shot, VirtualOptics, calibrate_against_white, shoot};
     use nirspi_optics::CameraModel;
     use nirspi_recon::reconstruct::{Method, MethodSettings, hadamard};
     use nirspi_recon::{Image, Order, metrics};
+    use nirspi_virtual::{Shot, VirtualOptics, calibrate_against_white, shoot};
     use std::ops::ControlFlow;
     use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -7,10 +7,10 @@ use nirspi::capture::Calibration;
 use nirspi::response::Settling;
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
-use nirspi::virtual_camera::{MemoryLink, VirtualOptics, calibrate_against_white};
 use nirspi_optics::CameraModel;
 use nirspi_optics::rain::Air;
 use nirspi_recon::Order;
+use nirspi_virtual::{MemoryLink, VirtualOptics, calibrate_against_white};
 
 impl Turns {
     /// The paper's camera with this seed before a letter, half of the patterns, with every method

@@ -37,18 +37,18 @@ impl StagedScene {
     /// A virtual camera before this scene.
     ///
     /// # Errors
-    /// [`VirtualOpticsError`](nirspi::virtual_camera::VirtualOpticsError) if the camera cannot see a
+    /// [`VirtualOpticsError`](nirspi_virtual::VirtualOpticsError) if the camera cannot see a
     /// scene at this distance, or there are too many drops to compute.
     pub fn camera(
         &self,
         model: &nirspi_optics::CameraModel,
         seed: u64,
     ) -> Result<
-        nirspi::virtual_camera::VirtualCamera<nirspi::virtual_camera::OpticalFpga>,
-        nirspi::virtual_camera::VirtualOpticsError,
+        nirspi_virtual::VirtualCamera<nirspi_virtual::OpticalFpga>,
+        nirspi_virtual::VirtualOpticsError,
     > {
         let distance_mm = self.distance_m * 1e3;
-        let optics = nirspi::virtual_camera::VirtualOptics::before(model, &self.map, distance_mm)?;
+        let optics = nirspi_virtual::VirtualOptics::before(model, &self.map, distance_mm)?;
         optics.in_air(&self.air)?.camera(seed)
     }
 }

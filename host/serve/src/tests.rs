@@ -12,13 +12,13 @@ use nirspi::link::{Link, Received};
 use nirspi::provenance::Made;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{OpticalFpga, VirtualCamera, VirtualOptics};
 use nirspi_mcu::{Limits, Micros};
 use nirspi_optics::Scene;
 use nirspi_recon::reconstruct::{
     Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction,
 };
 use nirspi_recon::{Measurements, Order};
+use nirspi_virtual::{OpticalFpga, VirtualCamera, VirtualOptics};
 use nirspi_wire::{Command, Request, RunLength, State, encode, version};
 use socket2::SockRef;
 use std::io::{self, BufRead, BufReader, Write};

@@ -6,7 +6,7 @@
 //!
 //! # Invariant
 //! Every capture runs with a latency that was measured or that the user gave
-//! (`a_dark_scene_uses_the_kept_latency_or_fails` in `host/tests/calibration.rs`).
+//! (`a_dark_scene_uses_the_kept_latency_or_fails` in `host/virtual/tests/calibration.rs`).
 
 mod burst;
 mod file;

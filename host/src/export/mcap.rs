@@ -10,11 +10,9 @@ use crate::integrate::Integrated;
 use crate::provenance::Provenance;
 use crate::recording::{Book, Heard, Opening, Recording, hear_recording};
 use crate::tally::Tally;
-#[cfg(feature = "virtual-camera")]
 use crate::{depth_image, recording::Pinhole};
 use nirspi_recon::Image;
 use nirspi_recon::reconstruct::{Method, Reconstruct, Stacked};
-#[cfg(feature = "virtual-camera")]
 use nirspi_wire::DeviceMessage;
 use std::io::{self, Write};
 use std::path::Path;
@@ -54,7 +52,6 @@ pub(super) fn write(
         let (identity, setup, provenance) = (&identity, &setup, Some(provenance));
         let opening = Opening { identity, setup, settling, run, provenance };
         let mut book = Book::begin(file, &opening).map_err(io_error)?;
-        #[cfg(feature = "virtual-camera")]
         if let Some(model) = &options.model {
             let time = whole.time_ns.first().map_or(0, |&time| time as u64);
             book.pinhole(time, &Pinhole::from(model)).map_err(io_error)?;
@@ -82,7 +79,6 @@ pub(super) fn write(
 }
 
 /// Writes the depth map of a packet that has one, if the camera is described.
-#[cfg(feature = "virtual-camera")]
 fn depth<W: Write>(
     book: &mut Book<W>,
     heard: &Heard<'_>,
@@ -95,11 +91,6 @@ fn depth<W: Write>(
         Some(pixels_m) => book.depth(heard.time_ns, &pixels_m),
         None => Ok(()),
     }
-}
-
-#[cfg(not(feature = "virtual-camera"))]
-fn depth<W: Write>(_: &mut Book<W>, _: &Heard<'_>, _: &ExportOptions) -> io::Result<()> {
-    Ok(())
 }
 
 enum What<'p> {

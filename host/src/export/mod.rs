@@ -21,7 +21,6 @@ use crate::provenance::Made;
 use crate::recording::{Recording, RecordingError, hear_recording};
 use crate::setup::MeasurementSetup;
 use crate::source::{self, Source, SourceError, SourceOptions};
-#[cfg(feature = "virtual-camera")]
 use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::ReconstructError;
@@ -124,7 +123,6 @@ pub struct ExportOptions {
     pub keep_leak: bool,
     /// The description of the camera: the geometry of the images and the place of depth maps in them,
     /// two channels of MCAP files.
-    #[cfg(feature = "virtual-camera")]
     pub model: Option<CameraModel>,
     /// Whether MCAP files also get the enhanced images, and how well each of their pixels repeats.
     #[cfg(feature = "enhance")]

@@ -29,7 +29,7 @@ pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
 const MAX_FIELD_BYTES: u64 = 256 << 20;
 
 /// An open archive.
-pub(super) struct Archive {
+pub struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
     names: Vec<String>,
@@ -37,13 +37,19 @@ pub(super) struct Archive {
 
 /// A field of numbers in C order.
 #[derive(Debug)]
-pub(super) struct Numbers<T = f64> {
-    pub(super) shape: Vec<usize>,
-    pub(super) values: Vec<T>,
+pub struct Numbers<T = f64> {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// The numbers, the last axis fastest.
+    pub values: Vec<T>,
 }
 
 impl Archive {
-    pub(super) fn open(path: &Path) -> Result<Self, FileError> {
+    /// Opens an archive of arrays (`.npz`).
+    ///
+    /// # Errors
+    /// [`FileError`] for a file that is none, or that is damaged.
+    pub fn open(path: &Path) -> Result<Self, FileError> {
         let (mut file, _) = open_file(path, EXPECTED)?;
         let mut start = Vec::new();
         file.by_ref()
@@ -66,16 +72,22 @@ impl Archive {
     }
 
     /// The names of all fields, sorted.
-    pub(super) fn names(&self) -> &[String] {
+    #[must_use]
+    pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    pub(super) fn holds(&self, field: &str) -> bool {
+    /// Whether there is a field of this name.
+    #[must_use]
+    pub fn holds(&self, field: &str) -> bool {
         self.names.iter().any(|name| name == field)
     }
 
     /// Reads a field. `accept` checks the shape; its error is a description of the expected shape.
-    pub(super) fn numbers(
+    ///
+    /// # Errors
+    /// [`FileError`] if the field is missing, damaged or too large, or its shape is not accepted.
+    pub fn numbers(
         &mut self,
         field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
@@ -85,7 +97,10 @@ impl Archive {
 
     /// Reads a field as [`numbers`](Self::numbers) does, as numbers of another type. Stacks of
     /// images do not need 8 bytes a pixel.
-    pub(super) fn numbers_of<T: Sample>(
+    ///
+    /// # Errors
+    /// Those of [`numbers`](Self::numbers).
+    pub fn numbers_of<T: Sample>(
         &mut self,
         field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
@@ -184,7 +199,7 @@ impl Archive {
 ///
 /// # Errors
 /// [`FileError`] naming `path`, if the archive cannot be written.
-pub(crate) fn encode(path: &Path, members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, FileError> {
+pub fn encode(path: &Path, members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, FileError> {
     use std::io::Write as _;
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (field, bytes) in members {

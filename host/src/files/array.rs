@@ -53,7 +53,8 @@ enum Kind {
 }
 
 /// A number type into which array elements are converted.
-pub(super) trait Sample: Copy {
+pub trait Sample: Copy {
+    /// The nearest number of this type.
     fn from_f64(value: f64) -> Self;
 }
 

@@ -112,11 +112,14 @@ pub enum FileError {
 }
 
 impl FileError {
-    pub(crate) fn io(path: &Path, attempt: &'static str, system: io::Error) -> Self {
+    /// An attempt, such as "read", that the system refused.
+    #[must_use]
+    pub fn io(path: &Path, attempt: &'static str, system: io::Error) -> Self {
         Self::Io { path: path.to_owned(), attempt, system }
     }
 
-    pub(crate) fn field(
+    /// A field that holds something else than expected.
+    pub fn field(
         path: &Path,
         field: impl Into<String>,
         found: impl Into<String>,
@@ -126,7 +129,8 @@ impl FileError {
         Self::Field { path: path.to_owned(), field, found, expected }
     }
 
-    pub(crate) fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {
+    /// A file that is something else than expected.
+    pub fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {
         Self::Kind { path: path.to_owned(), found: found.into(), expected }
     }
 }

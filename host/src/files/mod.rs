@@ -10,8 +10,8 @@
 //!
 //! A browser has no files: there, only pictures and tables are built.
 
-#[cfg(feature = "training")]
-pub mod characters;
+#[cfg(not(target_family = "wasm"))]
+pub mod archive;
 #[cfg(not(target_family = "wasm"))]
 pub mod folder;
 #[cfg(feature = "pictures")]
@@ -29,8 +29,6 @@ pub mod settings;
 pub mod table;
 
 #[cfg(not(target_family = "wasm"))]
-mod archive;
-#[cfg(not(target_family = "wasm"))]
 mod array;
 mod error;
 #[cfg(not(target_family = "wasm"))]
@@ -47,8 +45,6 @@ mod testing;
 #[cfg(not(target_family = "wasm"))]
 mod text;
 
-#[cfg(feature = "training")]
-pub(crate) use archive::encode as encode_archive;
 pub use error::FileError;
-pub(crate) use plain::read_text;
+pub use plain::read_text;
 pub use plain::{read_at_most, read_small, read_small_text};

@@ -37,7 +37,7 @@ const MAX_TEXT_MIB: u64 = 4;
 const MAX_LARGE_TEXT_MIB: u64 = 256;
 
 /// Reads a plain text file of at most 4 MiB, by [`decode`]. Every error names the path.
-pub(crate) fn read_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
+pub fn read_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_TEXT_MIB)?;
     decode(bytes).map_err(|NotText(found)| FileError::kind(path, found, expected))
 }

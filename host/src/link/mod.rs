@@ -47,7 +47,8 @@ pub trait Link: Send {
 }
 
 /// Whether the error means that the other side has gone, and not that this side has a problem.
-pub(crate) fn is_hangup(error: &io::Error) -> bool {
+#[must_use]
+pub fn is_hangup(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::ConnectionReset

@@ -175,7 +175,6 @@ impl<W: Write> Book<W> {
     ///
     /// # Errors
     /// The writer's error.
-    #[cfg(feature = "virtual-camera")]
     pub(crate) fn depth(&mut self, time_ns: u64, pixels_m: &[f32]) -> io::Result<()> {
         let image = schemas::raw_image(time_ns, nirspi_optics::SIDE, pixels_m);
         self.other(Channel::Depth, time_ns, &image)
@@ -185,7 +184,6 @@ impl<W: Write> Book<W> {
     ///
     /// # Errors
     /// The writer's error.
-    #[cfg(feature = "virtual-camera")]
     pub(crate) fn pinhole(&mut self, time_ns: u64, pinhole: &schemas::Pinhole) -> io::Result<()> {
         self.other(Channel::Calibration, time_ns, &pinhole.encode(time_ns))
     }

@@ -225,7 +225,6 @@ pub struct Pinhole {
 
 /// The geometry of the images of a camera, as its description has the projector: the images have no
 /// distortion.
-#[cfg(feature = "virtual-camera")]
 impl From<&nirspi_optics::CameraModel> for Pinhole {
     fn from(camera: &nirspi_optics::CameraModel) -> Self {
         let side = nirspi_optics::SIDE;
@@ -235,10 +234,6 @@ impl From<&nirspi_optics::CameraModel> for Pinhole {
 }
 
 impl Pinhole {
-    #[cfg_attr(
-        not(feature = "virtual-camera"),
-        allow(dead_code, reason = "no description of a camera gives a geometry")
-    )]
     pub(crate) fn encode(&self, time_ns: u64) -> Vec<u8> {
         let Self { side, focal_px: f } = *self;
         let c = f64::from(side) / 2.0;

@@ -8,7 +8,7 @@ use nirspi::recording::Target;
 use nirspi::session::Session;
 use nirspi::identity::CameraIdentity;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{MemoryLink, OpticalFpga, VirtualCamera, VirtualOptics};
+use nirspi_virtual::{MemoryLink, OpticalFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::Order;
 use nirspi_wire::{Command, Request, RunLength, encode, version};

@@ -4,9 +4,9 @@
 //! a run is as repeatable as on one thread.
 
 use crate::board::{Board, Front, HOST_PS, Seen};
-use nirspi::virtual_camera::{SimulatedFpga, VirtualOptics};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{Chain, LedArray};
+use nirspi_virtual::{SimulatedFpga, VirtualOptics};
 use nirspi_wire::register::{Register, control};
 use std::sync::mpsc::{Receiver, Sender, channel};
 

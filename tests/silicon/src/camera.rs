@@ -234,7 +234,7 @@ impl Link for ChipLink {
 /// In words, if the address cannot be listened on, or without Unicorn.
 pub fn serve(address: &str) -> Result<(), String> {
     let library = library().ok_or("no Unicorn")?;
-    let optics = nirspi::virtual_camera::VirtualOptics::new(nirspi_optics::Scene::white(), 300.0);
+    let optics = nirspi_virtual::VirtualOptics::new(nirspi_optics::Scene::white(), 300.0);
     let model = optics.and_then(|optics| optics.fpga(1)).map_err(|error| error.to_string())?;
     let listener = TcpListener::bind(address).map_err(|error| format!("{address}: {error}"))?;
     let address = listener.local_addr().map_err(|error| error.to_string())?;

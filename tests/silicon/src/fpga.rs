@@ -1,8 +1,8 @@
 //! The FPGA beside the chip: the gateware's golden model.
 
-use nirspi::virtual_camera::SimulatedFpga;
 use nirspi_hdl_model::{AdcSample, Gateware};
 use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_virtual::SimulatedFpga;
 use nirspi_wire::ADC_HZ;
 use nirspi_wire::host_port::{
     QUAD, READ_FRAME, READ_PACKET, READ_RAW, READ_REGISTER, SEALED_BYTES, WRITE_REGISTER, seal,

@@ -11,9 +11,9 @@ use crate::fpga::{Even, Golden};
 use nirspi::link::Link;
 use nirspi::session::{IgnorePackets, Session, request};
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::Order;
+use nirspi_virtual::{MemoryLink, VirtualOptics};
 use nirspi_wire::RunLength;
 
 const SEED: u64 = 7;

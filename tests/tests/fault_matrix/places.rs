@@ -6,13 +6,13 @@ use nirspi::recording::Target;
 use nirspi::replay::{ReplayAddress, ReplayLink, Speed};
 use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{
-    OpticalFpga, ServeOptions, SimulatedFpga, VirtualCamera, VirtualOptics, serve,
-};
 use nirspi_mcu::{BusError, FpgaBus, Limits, Micros};
 use nirspi_optics::Scene;
 use nirspi_tests::debugger::{Debugger, NOWHERE, Waiting};
 use nirspi_tests::emulated::Emulated;
+use nirspi_virtual::{
+    OpticalFpga, ServeOptions, SimulatedFpga, VirtualCamera, VirtualOptics, serve,
+};
 use nirspi_wire::State;
 use nirspi_wire::register::{Register, control};
 use std::io;

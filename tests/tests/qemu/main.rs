@@ -11,7 +11,6 @@ use nirspi::link::Link;
 use nirspi::session::{IgnorePackets, Session, SessionError, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi::signal::Signal;
-use nirspi::virtual_camera::{MemoryLink, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::{Order, Side, metrics, reconstruct};
 use nirspi_tests::debugger::{NOWHERE, Waiting};
@@ -21,6 +20,7 @@ use nirspi_tests::firmware;
 use nirspi_tests::pages::{page, table};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
 use nirspi_tests::tapped::{Tapped, measure, run};
+use nirspi_virtual::{MemoryLink, VirtualOptics};
 use nirspi_wire::{Fault, GatewareChunk, Refusal, RunLength, State};
 
 const PX: usize = 64;

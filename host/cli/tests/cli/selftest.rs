@@ -1,8 +1,8 @@
 //! `nirspi selftest`, and the calibration that it leaves for `nirspi capture`.
 
 use crate::bench::Bench;
-use nirspi::virtual_camera::{ServeOptions, VirtualCamera, VirtualOptics, serve};
 use nirspi_optics::Scene;
+use nirspi_virtual::{ServeOptions, VirtualCamera, VirtualOptics, serve};
 use std::net::TcpListener;
 use std::sync::atomic::AtomicBool;
 

@@ -2,8 +2,8 @@
 
 use crate::bench::Bench;
 use nirspi::scene::SceneSource;
-use nirspi::virtual_camera::{VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
+use nirspi_virtual::{VirtualCamera, VirtualOptics};
 use rustix::fd::OwnedFd;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use std::fs::File;
@@ -88,7 +88,7 @@ impl Drop for Plugged {
     }
 }
 
-fn camera() -> VirtualCamera<nirspi::virtual_camera::OpticalFpga> {
+fn camera() -> VirtualCamera<nirspi_virtual::OpticalFpga> {
     let map = "letter:R".parse::<SceneSource>().unwrap().load(64).unwrap();
     let scene = Scene::new(map.reflectance, map.size_px, map.side_mm.unwrap()).unwrap();
     VirtualOptics::new(scene, 300.0).unwrap().camera(7).unwrap()

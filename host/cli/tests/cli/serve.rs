@@ -2,8 +2,8 @@
 
 use crate::bench::{Bench, Process, correlation};
 use nirspi::scene::SceneSource;
-use nirspi::virtual_camera::VirtualOptics;
 use nirspi_optics::Scene;
+use nirspi_virtual::VirtualOptics;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};

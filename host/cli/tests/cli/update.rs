@@ -1,7 +1,7 @@
-//! `nirspi update`, up to where a camera that can be updated would be needed: `host/src/update/tests.rs` goes on.
+//! `nirspi update`, up to where a camera that can be updated would be needed: `host/update/src/tests.rs` goes on.
 
 use crate::bench::Bench;
-use nirspi::update::{Component, Source, pack};
+use nirspi_update::{Component, Source, pack};
 
 #[test]
 fn a_release_that_does_not_fit_is_one_line_and_changes_nothing() {

@@ -5,8 +5,9 @@
 //! (`tests::only_groups_held_out_are_taken`), and none is byte for byte an image of the training
 //! data under another family's name (`tests::no_held_out_image_is_one_of_training`).
 
+use crate::characters;
 use crate::error::{EvalError, On, Result};
-use nirspi::files::{characters, read_small_text};
+use nirspi::files::read_small_text;
 use nirspi_nets::HELD_OUT;
 use nirspi_nets::data::{Families, Stack};
 use rand::SeedableRng;

@@ -5,7 +5,7 @@
 //! All methods get the same readings of a scene (`tests::every_method_gets_the_same_readings`).
 
 use crate::error::{EvalError, Result};
-use nirspi::training::{Conditions, LinearCamera, Rainfall};
+use crate::training::{Conditions, LinearCamera, Rainfall};
 use nirspi_nets::interval::{Readings, Seen};
 use nirspi_nets::{Enhanced, Enhancer, Images, Known, MeasuredRows, Options};
 use nirspi_optics::CameraModel;

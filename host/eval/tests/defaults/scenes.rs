@@ -1,12 +1,12 @@
 //! The scenes of the table, how each is measured, and what judges it.
 
 use super::natural::Scenes;
-use nirspi::example::Example;
 use nirspi::scene::SceneSource;
 use nirspi::source::{Index, Source, SourceOptions};
 use nirspi_eval::completion::Scene;
 use nirspi_recon::reconstruct::{Method, MethodSettings};
 use nirspi_recon::{Image, Measurements, Rows, Side, fwht, metrics};
+use nirspi_virtual::example::Example;
 use std::fmt;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

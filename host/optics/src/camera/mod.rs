@@ -6,7 +6,7 @@
 //! budget, range, virtual camera and training take their settings from a [`CameraModel`]:
 //! [`CameraModel::projector`], [`CameraModel::budget_settings`], [`CameraModel::chain_settings`]
 //! and [`CameraModel::instrument`]. The test `the_budget_is_that_of_the_camera_simulated`
-//! (`host/tests/budget.rs`) compares the budget with the virtual camera.
+//! (`host/virtual/tests/budget.rs`) compares the budget with the virtual camera.
 
 mod file;
 mod views;

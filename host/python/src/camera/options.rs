@@ -5,8 +5,8 @@ use crate::orders::named;
 use nirspi::capture::CalibrationPolicy;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::{CameraModel, VirtualOptics};
-use nirspi::weather::read_weather;
+use nirspi_virtual::{CameraModel, VirtualOptics};
+use nirspi_virtual::weather::read_weather;
 use nirspi_recon::Sampling;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -42,7 +42,7 @@ impl Options<'_> {
     pub(super) fn model(&self) -> PyResult<CameraModel> {
         match (&self.model_text, &self.model) {
             (Some(text), _) => CameraModel::parse(text).map_err(refusal),
-            (None, Some(name)) => nirspi::virtual_camera::read_camera_model(name).map_err(refusal),
+            (None, Some(name)) => nirspi_virtual::read_camera_model(name).map_err(refusal),
             (None, None) => Ok(CameraModel::paper().clone()),
         }
     }

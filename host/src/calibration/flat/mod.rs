@@ -14,7 +14,7 @@
 //! # Invariant
 //! A corrected image of the white sheet is white: the remaining pattern is at least ten times
 //! smaller with LEDs that differ by 10 % (`a_flat_field_takes_the_pattern_of_unequal_leds_away` in
-//! `host/tests/flat_field.rs`).
+//! `host/virtual/tests/flat_field.rs`).
 
 mod kept;
 mod measured;

@@ -5,7 +5,7 @@ use nirspi::calibration::{KeptCalibration, KeptFlatField};
 use nirspi::response::Settling;
 use nirspi::files::order_table::read_order_table;
 use nirspi::files::settings::{Options, Takes, from_file};
-use nirspi::virtual_camera::read_camera_model;
+use nirspi_virtual::read_camera_model;
 use nirspi_optics::CameraModel;
 use nirspi_recon::{Order, Side};
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "cameras",
         reads: "a camera description (TOML)",
-        readers: &["host/src/virtual_camera/model.rs", "host/optics/src/camera/file.rs"],
+        readers: &["host/virtual/src/model.rs", "host/optics/src/camera/file.rs"],
         holds: cameras,
         seeds: camera_seeds,
         longest: 8192,

@@ -1,7 +1,7 @@
 //! Bitstreams, the FPGA that is loaded with them, and release folders.
 
 use crate::{Law, MIB, place, read};
-use nirspi::update::{Component, MANIFEST, Release};
+use nirspi_update::{Component, MANIFEST, Release};
 use nirspi_mcu::ecp5::SlaveSpi;
 use nirspi_mcu::staging::{StagingLoader, stored};
 use nirspi_mcu::{BusError, GatewareLoader, Micros};
@@ -20,7 +20,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "releases",
         reads: "the manifest of a release folder (JSON), and the files that it lists",
-        readers: &["host/src/update/release.rs"],
+        readers: &["host/update/src/release.rs"],
         holds: releases,
         seeds: release_seeds,
         longest: 4096,

@@ -2,7 +2,7 @@
 
 use crate::{Law, MIB, is_one_line, seeds};
 use nirspi::events;
-use nirspi::virtual_camera::serve_tunnel;
+use nirspi_virtual::serve_tunnel;
 use nirspi_hdl_model::{AdcSample, Gateware};
 use nirspi_wire::fpga::{CRC_BYTES, FpgaFrame, HEADER_BYTES, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::host_port::{self, READ_FRAME, READ_REGISTER, WRITE_REGISTER, seal, unseal};
@@ -82,7 +82,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "tunnel",
         reads: "accesses of an emulated board over TCP",
-        readers: &["mcu/wire/src/tunnel.rs", "host/src/virtual_camera/tunnel.rs"],
+        readers: &["mcu/wire/src/tunnel.rs", "host/virtual/src/tunnel.rs"],
         holds: tunnel_line,
         seeds: tunnel_seeds,
         longest: 512,

@@ -5,8 +5,8 @@ use nirspi::check::{Check, Verdict};
 use nirspi::fpga::{Fpga, Sampling};
 use nirspi::selftest::{LinkDemands, SelfTest, run};
 use nirspi::session::{IgnorePackets, Session};
-use nirspi::virtual_camera::{MemoryLink, VirtualCamera};
 use nirspi_tests_rtl::RtlFpga;
+use nirspi_virtual::{MemoryLink, VirtualCamera};
 use std::time::Duration;
 
 fn session(fpga: RtlFpga) -> Session {
@@ -29,7 +29,7 @@ fn failures(found: &SelfTest) -> Vec<&Check> {
 fn the_self_test_passes_through_the_rtl_without_any_adc() {
     let mut fpga = RtlFpga::bring_up();
     // A window of the frequency meter: 0.4 ms.
-    nirspi::virtual_camera::SimulatedFpga::advance(&mut fpga, 60_000);
+    nirspi_virtual::SimulatedFpga::advance(&mut fpga, 60_000);
     let mut session = session(fpga);
     assert!(
         session.reports().lines.iter().any(|line| line.contains("bring-up")),

@@ -4,11 +4,11 @@
 use crate::ideal;
 use nirspi::capture::Ended;
 use nirspi::setup::MeasurementSetup;
-use nirspi::virtual_camera::MemoryLink;
 use nirspi_recon::Order;
 use nirspi_tests::emulated::Emulated;
 use nirspi_tests::tapped::run;
 use nirspi_tests_rtl::RtlFpga;
+use nirspi_virtual::MemoryLink;
 
 #[test]
 fn frames_of_the_rtl_come_through_the_emulated_board_as_the_golden_models_do() {

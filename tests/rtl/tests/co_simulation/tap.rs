@@ -2,8 +2,8 @@
 //!
 //! A tap changes nothing.
 
-use nirspi::virtual_camera::SimulatedFpga;
 use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_virtual::SimulatedFpga;
 use std::sync::{Arc, Mutex};
 
 /// Bytes of each frame and burst, in order of arrival.

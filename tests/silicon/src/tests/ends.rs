@@ -127,7 +127,7 @@ fn gateware_from_the_host_reaches_the_fpga_over_spi1_byte_for_byte() {
     let mut bitstream = vec![0xFF, 0x00, b'n', 0x00, 0xFF, 0xFF, 0xFF, 0xBD, 0xB3];
     bitstream.extend((0..40_000_u32).map(|n| (n.wrapping_mul(2_654_435_761) >> 24) as u8));
     let mut session = Session::open(camera.link()).unwrap();
-    nirspi::gateware::load(&mut session, &bitstream, &mut |_| {}).unwrap_or_else(|error| {
+    nirspi_update::gateware::load(&mut session, &bitstream, &mut |_| {}).unwrap_or_else(|error| {
         panic!(
             "{error}; {:x?}",
             camera.with(|machine| (machine.resets.clone(), machine.violations()))

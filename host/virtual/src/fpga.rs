@@ -1,0 +1,312 @@
+//! The golden model of the gateware, with simulated light, behind the firmware's FPGA bus.
+
+use nirspi_hdl_model::{AdcSample, Gateware, Lines};
+use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_optics::rain::RainySpots;
+use nirspi_optics::{Chain, LedArray};
+use nirspi_wire::register::{BRING_UP_HZ, Design, loopback};
+use std::collections::VecDeque;
+
+/// ADC clocks between two updates of the drops: one differential sweep, in which a 2 mm drop falls
+/// half a millimetre.
+const WEATHER_CLOCKS: u64 = 10_240;
+
+/// An FPGA whose time the virtual camera advances.
+pub trait SimulatedFpga: FpgaBus + Send {
+    /// Advances the time by ADC clocks.
+    fn advance(&mut self, clocks: u32);
+    /// ADC clocks since power-up.
+    fn clock(&self) -> u64;
+    /// Whether LEDs can be lit: a run or raw burst is under way.
+    fn running(&self) -> bool;
+    /// Opens or closes the interlock input.
+    fn set_interlock(&mut self, closed: bool);
+}
+
+/// The LED array's answer to the lines of the FPGA: its settled light in electrons a sample.
+/// Correct wiring gives [`LedArray::light`] of the lines unchanged; tests use faulty wiring.
+pub type Wiring = Box<dyn FnMut(&mut LedArray, Lines) -> f32 + Send>;
+
+/// The golden model of the gateware between an LED array and a photodiode's ADC.
+pub struct OpticalFpga {
+    detector: Detector,
+    wiring: Option<Wiring>,
+    clock: u64,
+    rain: Option<Rain>,
+    /// The levels at the LED pins in the last clocks, of a bring-up design.
+    loopback: Option<VecDeque<Lines>>,
+}
+
+/// The gateware with the light that its detector gets.
+struct Detector {
+    gateware: Gateware,
+    array: LedArray,
+    chain: Chain,
+}
+
+impl Detector {
+    /// Powers up with the interlock closed.
+    fn new(array: LedArray, chain: Chain) -> Self {
+        let mut gateware = Gateware::new();
+        gateware.set_interlock(true);
+        Self { gateware, array, chain }
+    }
+
+    /// The sample of the light of these lines.
+    #[inline]
+    fn sample(&mut self, lines: Lines) -> AdcSample {
+        let light = self.array.light(lines.rows, lines.columns, lines.enable);
+        converted(&mut self.chain, light)
+    }
+
+    /// Advances the time. A simulation spends most of its time here.
+    fn advance(&mut self, clocks: u64) {
+        for _ in 0..clocks {
+            // The ADC is not read outside a run, and drawing its noise is most of the work.
+            let sample =
+                if self.gateware.running() { self.sample(self.gateware.lines()) } else { DARK };
+            self.gateware.tick(sample);
+        }
+    }
+}
+
+/// What the gateware gets of the ADC outside a run.
+const DARK: AdcSample = AdcSample { code: 0, over_range: false };
+
+/// The ADC's word for settled light in electrons a sample.
+#[inline]
+fn converted(chain: &mut Chain, light_electrons: f32) -> AdcSample {
+    let sample = chain.sample(light_electrons);
+    AdcSample { code: sample.counts, over_range: sample.over_range }
+}
+
+/// Clocks from the choice of the levels at the LED pins to the sample that `Design::BringUp` makes of them: two
+/// registers on the way out, one on the way in, four of `loopback`.
+const LOOPBACK_CLOCKS: usize = 7;
+
+/// Rain between the array and the scene.
+struct Rain {
+    spots: RainySpots,
+    electrons_per_led: f64,
+    /// The clock of the last update of the drops.
+    seen: u64,
+}
+
+impl OpticalFpga {
+    /// Powers up in front of a scene, with the interlock closed.
+    #[must_use]
+    pub fn new(array: LedArray, chain: Chain) -> Self {
+        let detector = Detector::new(array, chain);
+        let (wiring, rain, loopback) = (None, None, None);
+        Self { detector, wiring, clock: 0, rain, loopback }
+    }
+
+    /// The bring-up design on the same boards: neither ADC nor LEDs.
+    #[must_use]
+    pub fn bring_up(self) -> Self {
+        let mut gateware = Gateware::of(Design::BringUp);
+        gateware.set_adc_clock(Some(BRING_UP_HZ));
+        gateware.set_interlock(true);
+        let loopback = Some(VecDeque::from([Lines::default(); LOOPBACK_CLOCKS]));
+        let detector = Detector { gateware, ..self.detector };
+        Self { detector, loopback, rain: None, ..self }
+    }
+
+    /// Loses everything, as after a dip of the supply: registers, frames, LEDs off. The clock starts again at 0
+    /// in the gateware; the time of the simulation goes on.
+    pub fn reset(&mut self) {
+        self.detector.gateware = Gateware::new();
+        self.detector.gateware.set_interlock(true);
+    }
+
+    /// The next packet that the FPGA's parallel port sends, which then counts as sent.
+    pub fn parallel_packet(&mut self) -> Option<Vec<u8>> {
+        let packet = self.detector.gateware.outgoing()?;
+        self.detector.gateware.sent();
+        Some(packet)
+    }
+
+    /// Whether the FPGA lets LEDs shine now.
+    #[must_use]
+    pub fn leds_on(&self) -> bool {
+        self.lines().enable
+    }
+
+    /// The levels at the LED pins.
+    fn lines(&self) -> Lines {
+        self.detector.gateware.lines()
+    }
+
+    /// The same camera with another frequency of the ADC's clock in Hz; `None` is no clock at all.
+    #[must_use]
+    pub fn adc_clock(mut self, hz: Option<u32>) -> Self {
+        self.detector.gateware.set_adc_clock(hz);
+        self
+    }
+
+    /// The sample of a clock in a run.
+    fn sample(&mut self) -> AdcSample {
+        let lines = self.lines();
+        if let Some(late) = &mut self.loopback {
+            late.push_back(lines);
+            let seen = late.pop_front().unwrap_or_default();
+            let code = loopback(seen.rows, seen.columns, seen.enable);
+            return AdcSample { code, over_range: false };
+        }
+        match &mut self.wiring {
+            None => self.detector.sample(lines),
+            Some(wiring) => {
+                let light = wiring(&mut self.detector.array, lines);
+                converted(&mut self.detector.chain, light)
+            }
+        }
+    }
+
+    /// One clock.
+    fn tick(&mut self) {
+        let sample = if self.running() { self.sample() } else { DARK };
+        self.detector.gateware.tick(sample);
+    }
+
+    /// The same camera with other wiring between FPGA and LEDs.
+    #[must_use]
+    pub fn wired(self, wiring: impl FnMut(&mut LedArray, Lines) -> f32 + Send + 'static) -> Self {
+        Self { wiring: Some(Box::new(wiring)), ..self }
+    }
+
+    /// The same camera with rain in front of it. In dry air, an LED on a white target gives
+    /// `electrons_per_led`.
+    #[must_use]
+    pub fn in_rain(mut self, spots: RainySpots, electrons_per_led: f64) -> Self {
+        let reflectance = spots.reflectance();
+        self.detector.array.relight(&reflectance, electrons_per_led);
+        self.rain = Some(Rain { spots, electrons_per_led, seen: 0 });
+        self
+    }
+
+    /// Updates the positions of the drops if the last update is long ago. Returns the clocks until the next update; outside a
+    /// run, and in dry air, nothing is to be updated.
+    fn look_at_the_rain(&mut self) -> u64 {
+        let (now, running) = (self.clock, self.running());
+        let Some(rain) = self.rain.as_mut().filter(|_| running) else { return u64::MAX };
+        let passed = now - rain.seen;
+        if passed < WEATHER_CLOCKS {
+            return WEATHER_CLOCKS - passed;
+        }
+        rain.spots.advance(passed as f64 / f64::from(nirspi_wire::ADC_HZ));
+        rain.seen = now;
+        let (reflectance, electrons_per_led) = (rain.spots.reflectance(), rain.electrons_per_led);
+        self.detector.array.relight(&reflectance, electrons_per_led);
+        WEATHER_CLOCKS
+    }
+}
+
+impl SimulatedFpga for OpticalFpga {
+    fn advance(&mut self, clocks: u32) {
+        let end = self.clock + u64::from(clocks);
+        if !self.detector.gateware.has_adc_clock() {
+            self.clock = end;
+        }
+        // A camera without these needs none of their checks in each clock: docs/performance.md has its speed.
+        let plain = self.wiring.is_none() && self.loopback.is_none();
+        while self.clock < end {
+            let stretch = self.look_at_the_rain().min(end - self.clock);
+            if plain {
+                self.detector.advance(stretch);
+            } else {
+                (0..stretch).for_each(|_| self.tick());
+            }
+            self.clock += stretch;
+        }
+    }
+
+    fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    fn running(&self) -> bool {
+        self.detector.gateware.running()
+    }
+
+    fn set_interlock(&mut self, closed: bool) {
+        self.detector.gateware.set_interlock(closed);
+    }
+}
+
+impl FpgaBus for OpticalFpga {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        // An address without a register reads as zero, as on the real port.
+        Ok(self.detector.gateware.read(address).unwrap_or(0))
+    }
+
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        self.detector.gateware.write(address, value);
+        Ok(())
+    }
+
+    fn frame_ready(&mut self) -> bool {
+        self.detector.gateware.frame_ready()
+    }
+
+    fn raw_ready(&mut self) -> bool {
+        self.detector.gateware.raw_ready()
+    }
+
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.detector.gateware.frame())
+    }
+
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        Ok(self.detector.gateware.raw())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::VirtualOptics;
+    use nirspi_optics::Scene;
+    use nirspi_optics::rain::Air;
+    use nirspi_wire::register::{Register, control, mode};
+
+    /// Frames of a run that is advanced in stretches of these lengths.
+    fn frames(mut fpga: OpticalFpga, stretches: &[u32]) -> Vec<Vec<u8>> {
+        for (register, value) in [
+            (Register::Mode, mode::DIFFERENTIAL),
+            (Register::Patterns, 64),
+            (Register::Frames, 60),
+            (Register::Control, control::START),
+        ] {
+            fpga.write(register.address(), value).unwrap();
+        }
+        let mut frames = Vec::new();
+        // Two frames take 1280 clocks, and three can wait.
+        for stretch in stretches.iter().cycle() {
+            if !fpga.running() && !fpga.frame_ready() {
+                break;
+            }
+            fpga.advance(*stretch);
+            while let Some(frame) = fpga.frame().unwrap() {
+                frames.push(frame.to_vec());
+                fpga.write(Register::Control.address(), control::RELEASE).unwrap();
+            }
+        }
+        frames
+    }
+
+    /// In rain the drops move three times within the run, in whichever stretches the time passes.
+    #[test]
+    fn the_same_light_comes_in_long_stretches_and_clock_by_clock() {
+        for air in ["none", "heavy"] {
+            let air: Air = air.parse().unwrap();
+            let optics = VirtualOptics::new(Scene::white(), 300.0).unwrap().in_air(&air).unwrap();
+            let fpga = || optics.fpga(1).unwrap();
+            let seen = frames(fpga(), &[1280]);
+            assert_eq!(seen.len(), 60);
+            assert_eq!(frames(fpga(), &[1, 7, 1023]), seen);
+            let wired =
+                fpga().wired(|array, lines| array.light(lines.rows, lines.columns, lines.enable));
+            assert_eq!(frames(wired, &[999]), seen, "by the loop of faulty wiring");
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! The self-test on virtual cameras: a sound one passes, and each deliberate fault is seen by its own check.
+
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
+use nirspi::check::{Check, Verdict};
+use nirspi::link::{Link, Received};
+use nirspi::selftest::{LinkDemands, SelfTest, run};
+use nirspi::session::Session;
+use nirspi_hdl_model::Lines;
+use nirspi_mcu::{BusError, FpgaBus};
+use nirspi_optics::{LedArray, Scene};
+use nirspi_virtual::{MemoryLink, OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics};
+use nirspi_wire::register::{Register, mode};
+use std::collections::HashMap;
+use std::io;
+use std::time::Duration;
+
+/// A white sheet across the whole field.
+fn optics() -> VirtualOptics {
+    VirtualOptics::new(Scene::new(vec![0.9; 64 * 64], 64, 60.0).unwrap(), 300.0).unwrap()
+}
+
+fn test(link: impl Link + 'static) -> SelfTest {
+    test_for(Duration::from_millis(300), link)
+}
+
+fn test_for(duration: Duration, link: impl Link + 'static) -> SelfTest {
+    let mut session = Session::open(Box::new(link)).unwrap();
+    let demands = LinkDemands { min_frames_per_s: 0.0, duration };
+    run(&mut session, demands, &mut |_| {}).unwrap()
+}
+
+fn plugged<F: SimulatedFpga>(fpga: F) -> MemoryLink<F> {
+    MemoryLink::new(VirtualCamera::new(fpga, optics().depth(1).unwrap(), "under-test"))
+}
+
+fn wired(wiring: impl FnMut(&mut LedArray, Lines) -> f32 + Send + 'static) -> SelfTest {
+    test(plugged(optics().fpga(1).unwrap().wired(wiring)))
+}
+
+fn failures(found: &SelfTest) -> Vec<&Check> {
+    found.checks.iter().filter(|check| check.verdict() == Verdict::Failed).collect()
+}
+
+/// Exactly this check has failed, and says all of these words.
+#[track_caller]
+fn only(found: &SelfTest, name: &str, words: &[&str]) {
+    let failed = failures(found);
+    let names: Vec<&str> = failed.iter().map(|check| check.name()).collect();
+    assert_eq!(names, [name], "{failed:#?}");
+    for word in words {
+        assert!(failed[0].note().contains(word), "nothing of {word:?} in {:?}", failed[0]);
+    }
+}
+
+#[test]
+fn a_sound_camera_passes_and_gives_its_calibration() {
+    let found = test(MemoryLink::new(optics().camera(1).unwrap()));
+    assert!(found.passed(), "{:#?}", failures(&found));
+    assert_eq!(found.settling.unwrap().adc_latency, optics().chain().adc_latency_clocks);
+    let skipped = found.checks.iter().filter(|check| check.verdict() == Verdict::Skipped);
+    // The virtual camera has no memory of its own that frames pass through, and samples without a phase.
+    let names: Vec<&str> = skipped.map(Check::name).collect();
+    assert_eq!(names, ["device: frame memory", "ADC sampling phase"], "{:#?}", found.checks);
+}
+
+fn note<'f>(found: &'f SelfTest, name: &str) -> &'f str {
+    found.checks.iter().find(|check| check.name() == name).unwrap().note()
+}
+
+#[test]
+fn two_boards_without_adc_pass_with_the_bring_up_design() {
+    let found = test(plugged(optics().fpga(1).unwrap().bring_up()));
+    assert!(found.passed(), "{:#?}", failures(&found));
+    assert_eq!(found.settling.as_ref().unwrap().adc_latency, 7);
+    assert!(note(&found, "device: FPGA identity").contains("0x4e535049"), "{:#?}", found.checks);
+    assert!(note(&found, "device: gateware").contains("bring-up"), "{:#?}", found.checks);
+    assert!(note(&found, "device: ADC clock").contains("124.80 MHz"), "{:#?}", found.checks);
+    assert!(note(&found, "LED lines").contains("64 lines"), "{:#?}", found.checks);
+}
+
+#[test]
+fn a_missing_adc_clock_is_the_one_failure_and_says_what_to_check() {
+    let found = test(plugged(optics().fpga(1).unwrap().adc_clock(None)));
+    only(&found, "device: ADC clock", &["0.00 MHz", "xpected 125 MHz", "supply"]);
+    let slow = test(plugged(optics().fpga(1).unwrap().adc_clock(Some(62_500_000))));
+    only(&slow, "device: ADC clock", &["62.50 MHz", "sample clock"]);
+}
+
+#[test]
+fn a_stuck_line_is_named() {
+    let row = |stuck: u32| {
+        wired(move |array, lines| {
+            array.light(lines.rows & !(1 << 7) | stuck << 7, lines.columns, lines.enable)
+        })
+    };
+    only(&row(0), "LED lines", &["row line 7:"]);
+    only(&row(1), "LED lines", &["row line 7:"]);
+    let column = |lines: Lines| Lines { columns: lines.columns & !(1 << 31), ..lines };
+    let found = wired(move |array, lines| {
+        let lines = column(lines);
+        array.light(lines.rows, lines.columns, lines.enable)
+    });
+    only(&found, "LED lines", &["column line 31:"]);
+}
+
+#[test]
+fn a_supply_that_gives_way_when_more_leds_are_lit_is_seen() {
+    let found = wired(|array, lines| {
+        let all = array.light(0, 0, true);
+        let light = array.light(lines.rows, lines.columns, lines.enable);
+        light * (1.0 - 0.1 * light / all)
+    });
+    only(&found, "LED supply", &["supply gives way"]);
+    // Halves droop by 5 %, all by 10 %.
+    let expected = (0.95 / 0.90 - 1.0) * 100.0;
+    assert!((failures(&found)[0].value().unwrap() - expected).abs() < 2.0, "{found:#?}");
+}
+
+#[test]
+fn leds_that_hardly_light_are_seen_and_nothing_is_concluded_from_them() {
+    let weak = |array: &mut LedArray, lines: Lines| {
+        0.01 * array.light(lines.rows, lines.columns, lines.enable)
+    };
+    let found = wired(weak);
+    only(&found, "light of all LEDs", &[]);
+    let skipped = found.checks.iter().filter(|check| check.note() == "too little light").count();
+    assert_eq!(skipped, 3, "{:#?}", found.checks);
+}
+
+#[test]
+fn a_step_that_drowns_in_noise_is_not_stepped_and_no_calibration_is_kept() {
+    let dim = |array: &mut LedArray, lines: Lines| {
+        0.03 * array.light(lines.rows, lines.columns, lines.enable)
+    };
+    let found = wired(dim);
+    assert!(found.passed() && found.settling.is_none(), "{:#?}", failures(&found));
+    let stepping = found.checks.iter().find(|check| check.name().contains("stepping")).unwrap();
+    assert!(stepping.note().contains("too little light for a noise of"), "{stepping:?}");
+}
+
+#[test]
+fn darkness_is_no_calibration() {
+    let found = wired(|_, _| 0.0);
+    only(&found, "light of all LEDs", &["too dim"]);
+    assert!(found.settling.is_none());
+}
+
+/// An FPGA whose settings do not do what they say, though they read back as written.
+struct Tampered<W> {
+    inner: OpticalFpga,
+    told: HashMap<u16, u32>,
+    write: W,
+}
+
+fn tampered(write: impl FnMut(Register, u32) -> u32 + Send + 'static) -> SelfTest {
+    let inner = optics().fpga(1).unwrap();
+    test(plugged(Tampered { inner, told: HashMap::new(), write }))
+}
+
+impl<W: FnMut(Register, u32) -> u32 + Send> FpgaBus for Tampered<W> {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        let value = self.inner.read(address)?;
+        Ok(self.told.get(&address).copied().unwrap_or(value))
+    }
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        let done = Register::at(address).map_or(value, |register| (self.write)(register, value));
+        if done == value {
+            self.told.remove(&address);
+        } else {
+            self.told.insert(address, value);
+        }
+        self.inner.write(address, done)
+    }
+    fn frame_ready(&mut self) -> bool {
+        self.inner.frame_ready()
+    }
+    fn raw_ready(&mut self) -> bool {
+        self.inner.raw_ready()
+    }
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        self.inner.frame()
+    }
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        self.inner.raw()
+    }
+}
+
+impl<W: FnMut(Register, u32) -> u32 + Send> SimulatedFpga for Tampered<W> {
+    fn advance(&mut self, clocks: u32) {
+        self.inner.advance(clocks);
+    }
+    fn clock(&self) -> u64 {
+        self.inner.clock()
+    }
+    fn running(&self) -> bool {
+        self.inner.running()
+    }
+    fn set_interlock(&mut self, closed: bool) {
+        self.inner.set_interlock(closed);
+    }
+}
+
+#[test]
+fn a_latency_setting_that_is_off_is_seen_and_its_calibration_is_not_kept() {
+    let mut test_source = false;
+    let write = move |register, value: u32| match register {
+        Register::Mode => {
+            test_source = value & mode::TEST_SOURCE != 0;
+            value
+        }
+        // Of the detector only: the generator's frames would show it first.
+        Register::Latency if !test_source => (value + 2).min(63),
+        _ => value,
+    };
+    let found = tampered(write);
+    only(&found, "ADC latency by stepping", &["latency setting is off"]);
+    let check = failures(&found)[0];
+    assert_eq!(check.value(), Some(f64::from(optics().chain().adc_latency_clocks - 2)));
+    assert!(found.settling.is_none());
+}
+
+#[test]
+fn a_test_frame_of_another_length_of_window_is_seen() {
+    // The device's own test frame has the same window; so only those of seven clocks are wrong.
+    let write = |register, value: u32| match register {
+        Register::Dwell if value == 7 => 6,
+        _ => value,
+    };
+    let found = tampered(write);
+    only(&found, "test frames through the whole chain", &["frame 0, sample 0: "]);
+}
+
+#[test]
+fn an_open_interlock_fails_what_needs_light_and_names_the_reason() {
+    let mut camera = optics().camera(1).unwrap();
+    camera.set_interlock(false);
+    let found = test(MemoryLink::new(camera));
+    let interlock = found.checks.iter().find(|check| check.name() == "device: interlock").unwrap();
+    assert_eq!(interlock.verdict(), Verdict::Failed);
+    assert!(
+        failures(&found).iter().skip(1).all(|check| check.note().contains("interlock is open"))
+    );
+    assert!(found.settling.is_none());
+}
+
+/// A link that loses every third long packet.
+struct Lossy<L> {
+    inner: L,
+    chunk: Vec<u8>,
+    packet: Vec<u8>,
+    ready: Vec<u8>,
+    long: usize,
+}
+
+impl<L: Link> Link for Lossy<L> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.inner.send(bytes)
+    }
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        if self.ready.is_empty() {
+            match self.inner.receive(&mut self.chunk, timeout)? {
+                Received::Bytes(length) => {
+                    for &byte in &self.chunk[..length] {
+                        self.packet.push(byte);
+                        if byte == 0 {
+                            // Frames of 1024 patterns; bursts come in shorter pieces.
+                            self.long += usize::from(self.packet.len() > 3000);
+                            if self.packet.len() > 3000 && self.long.is_multiple_of(3) {
+                                self.packet.clear();
+                            }
+                            self.ready.append(&mut self.packet);
+                        }
+                    }
+                }
+                other => return Ok(other),
+            }
+        }
+        let length = self.ready.len().min(buffer.len());
+        buffer[..length].copy_from_slice(&self.ready[..length]);
+        self.ready.drain(..length);
+        Ok(if length == 0 { Received::Nothing } else { Received::Bytes(length) })
+    }
+}
+
+#[test]
+fn a_link_that_loses_frames_is_seen_and_the_camera_is_not_blamed() {
+    let inner = MemoryLink::new(optics().camera(1).unwrap());
+    let (chunk, packet, ready) = (vec![0; 1 << 16], Vec::new(), Vec::new());
+    // Long enough for three frames on a busy machine.
+    let found = test_for(Duration::from_secs(2), Lossy { inner, chunk, packet, ready, long: 0 });
+    only(
+        &found,
+        "link losses",
+        &[": 0 lost in the FPGA", "0 dropped by the firmware", "on the link"],
+    );
+}
+
+#[test]
+fn a_link_that_is_too_slow_is_seen() {
+    let mut session =
+        Session::open(Box::new(MemoryLink::new(optics().camera(1).unwrap()))).unwrap();
+    let demands = LinkDemands { min_frames_per_s: 1e9, duration: Duration::from_millis(100) };
+    let found = run(&mut session, demands, &mut |_| {}).unwrap();
+    only(&found, "link throughput", &["MB/s"]);
+}
