@@ -4,7 +4,7 @@
 //! Compiled with `--cfg fuzzing` alone.
 
 use super::camera_log::CameraLog;
-use super::imaging::Picture;
+use super::picture::Picture;
 use super::settings::{Measuring, Offer, Settings};
 use super::stage::{Stage, StagedScene};
 use super::state::Published;

@@ -10,7 +10,7 @@ use super::access::Access;
 use super::change_rate::PER_SECOND;
 use super::connections::{Connections, Door, Peer, Streaming};
 use super::delays::Passed;
-use super::imaging::Picture;
+use super::picture::Picture;
 use super::server::Server;
 use super::state::Published;
 use super::token;

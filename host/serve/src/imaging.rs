@@ -3,12 +3,12 @@
 
 use super::delays::Passed;
 use super::line::Line;
-use super::look::{DepthImage, Look};
+use super::look::Look;
 use super::moving::Moving;
+use super::picture::{Enhancement, Picture};
 use super::settings::{Offer, Settings, alternatives};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
-use nirspi::account::LossCounters;
 use nirspi::calibration::FlatField;
 use nirspi::causes;
 use nirspi::clock::{self, Instant};
@@ -21,7 +21,6 @@ use nirspi_recon::reconstruct::{
     Strength,
 };
 use nirspi_recon::{Measurements, Side};
-use serde::Serialize;
 use std::sync::{Arc, Mutex};
 use thiserror::Error;
 
@@ -199,116 +198,6 @@ fn strength_of(settings: &MethodSettings) -> Option<f64> {
         Strength::Fixed(strength) => Some(strength),
         Strength::CrossValidated { .. } => None,
     }
-}
-
-/// The images of one state, and their properties.
-#[derive(Debug, Serialize)]
-pub struct Picture {
-    /// The first image has number 1, each further one the next number.
-    pub number: u64,
-    /// The reconstructed image, (32, 32) ADC counts.
-    #[serde(skip)]
-    pub counts: Vec<f32>,
-    /// The enhanced image, (64, 64) in [0, 1], with white at 1.
-    #[serde(skip)]
-    pub enhanced: Option<Vec<f32>>,
-    /// Half-width of the 95 % interval of each pixel of the enhanced image; `None` for a network
-    /// without calibrated intervals.
-    #[serde(skip)]
-    pub half_width: Option<Vec<f32>>,
-    /// The readings, (32, 32) ADC counts: that of Hadamard row `32 r + c` at (r, c); NaN for a row
-    /// that was not measured.
-    #[serde(skip)]
-    pub readings: Vec<f32>,
-    /// The depth map that was fused.
-    #[serde(skip)]
-    pub depth: Option<Arc<DepthImage>>,
-    /// When the newest frame came out of the link.
-    #[cfg(feature = "server")]
-    #[serde(skip)]
-    pub arrived: Instant,
-    /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
-    pub arrived_unix_ms: u64,
-    method: &'static str,
-    /// Name of the patterns' order.
-    order: String,
-    /// Number of patterns shown.
-    patterns: usize,
-    /// Sweeps summed into one frame.
-    sweeps: u32,
-    /// The loss counters of the image's run, with its newest frame.
-    run_frames: LossCounters,
-    /// What the image takes from the images before, in words; `null` if it takes nothing.
-    past: Option<String>,
-    /// Number of summed frames.
-    frames: u64,
-    /// ADC counts of one pixel that were used as white.
-    white_counts: f32,
-    reconstruct_ms: f64,
-    /// The results of the learned stages; `null` if they are switched off.
-    enhancement: Option<Enhancement>,
-    /// Reasons not to trust the images: the frames' flags, and the results of the learned stages.
-    warnings: Vec<String>,
-    /// The warnings of the frames' flags, for the image itself.
-    frame_warnings: Vec<&'static str>,
-    /// Short forms of the learned stages' warnings, for the enhanced image itself.
-    short_warnings: Vec<&'static str>,
-}
-
-impl Picture {
-    /// The reconstructed image, (32, 32) in [0, 1], with white at 1.
-    #[cfg(feature = "server")]
-    pub fn shares_of_white(&self) -> Vec<f32> {
-        let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
-        self.counts.iter().map(|value| (value * scale).clamp(0.0, 1.0)).collect()
-    }
-}
-
-#[cfg(fuzzing)]
-impl Picture {
-    /// A picture of these counts, of which 2 are white.
-    pub fn of_counts(number: u64, counts: Vec<f32>, enhanced: Option<Vec<f32>>) -> Self {
-        Self {
-            number,
-            counts,
-            enhanced,
-            half_width: None,
-            readings: Vec::new(),
-            depth: None,
-            arrived: Instant::now(),
-            arrived_unix_ms: clock::since_1970().as_millis() as u64,
-            method: "hadamard",
-            order: String::new(),
-            patterns: 1024,
-            sweeps: 1,
-            run_frames: LossCounters::default(),
-            past: None,
-            frames: 1,
-            white_counts: 2.0,
-            reconstruct_ms: 0.0,
-            enhancement: None,
-            warnings: Vec::new(),
-            frame_warnings: Vec::new(),
-            short_warnings: Vec::new(),
-        }
-    }
-}
-
-/// The results of the learned stages.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct Enhancement {
-    /// The network that deblurred.
-    model: &'static str,
-    /// Estimated blur in pixels of the 64 x 64 grid.
-    blur_px: f32,
-    /// Estimated noise of a pixel; white is 1.
-    noise: f32,
-    /// Distance of the image from that of the result, divided by its noise. A value near 1 or below
-    /// means that the readings support the result.
-    inconsistency: f32,
-    /// Whether a depth map was fused.
-    depth: bool,
-    enhance_ms: f64,
 }
 
 /// What pages are told of the images.

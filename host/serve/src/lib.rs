@@ -19,6 +19,8 @@
 
 #[cfg(feature = "server")]
 mod access;
+#[cfg(feature = "server")]
+mod base_path;
 mod begin;
 mod camera;
 mod camera_log;
@@ -44,6 +46,7 @@ mod overload;
 mod page;
 #[cfg(feature = "server")]
 mod pages;
+mod picture;
 #[cfg(feature = "server")]
 mod server;
 pub mod settings;
@@ -59,7 +62,9 @@ mod token;
 mod turns;
 
 #[cfg(feature = "server")]
-pub use access::{Access, BasePath, BasePathError, HostName, HostNameError};
+pub use access::{Access, HostName, HostNameError};
+#[cfg(feature = "server")]
+pub use base_path::{BasePath, BasePathError};
 pub use begin::TurnsError;
 pub use camera::{CameraSource, Connect, Connected};
 pub use imaging::{Imaging, ImagingError};

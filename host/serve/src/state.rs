@@ -5,9 +5,9 @@
 
 use super::camera_log::{CameraState, EventLine};
 use super::delays::DelayState;
-use super::imaging::Picture;
 use super::line::LineState;
 use super::overload::OverloadState;
+use super::picture::Picture;
 use super::settings::{MAX_FRAMES, MAX_SWEEPS, Offer, Settings};
 use super::slot::Ledger;
 use super::stage::SceneState;

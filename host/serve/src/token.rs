@@ -6,7 +6,7 @@
 //! (`a_client_in_the_network_gets_nothing_without_the_token` in
 //! `host/cli/tests/cli/serve_guarded.rs`). Tokens are compared in constant time.
 
-use super::access::BasePath;
+use super::base_path::BasePath;
 use axum::http::{HeaderMap, Uri, header};
 use data_encoding::BASE64URL_NOPAD;
 use std::fmt;
