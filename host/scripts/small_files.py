@@ -2,7 +2,7 @@
 
     python host/scripts/small_files.py
 
-Writes host/src/files/small/: n = 2, h_row = 0, 3, 1 and y = 5, 1, 2, 3, 4, 4.5, a complex array z of 2 x 3, and a text. Needs numpy,
+Writes host/files/src/small/: n = 2, h_row = 0, 3, 1 and y = 5, 1, 2, 3, 4, 4.5, a complex array z of 2 x 3, and a text. Needs numpy,
 scipy and h5py. claims.h5 claims an array that takes more memory than a reader
 allows.
 """

@@ -39,49 +39,32 @@
     allow(dead_code, unused_imports, reason = "a browser has no files, and nothing to export to")
 )]
 
-pub mod about;
-pub mod account;
+pub use nirspi_camera::{
+    account, calibration, check, events, exposure, fpga, frame_time, info, integrate, link,
+    response, selftest, session, setup, signal, tally, versions,
+};
+pub use nirspi_files as files;
+pub use nirspi_files::{boards, causes, clock, identity, provenance};
 #[cfg(not(target_family = "wasm"))]
-pub mod address;
-pub mod boards;
-pub mod calibration;
-pub mod capture;
-pub mod causes;
-pub mod check;
-pub mod clock;
+pub use nirspi_record::{address, devices};
+pub use nirspi_record::{capture, recording, replay};
+
+pub mod about;
 pub mod depth_image;
 #[cfg(not(target_family = "wasm"))]
-pub mod devices;
-pub mod events;
-#[cfg(not(target_family = "wasm"))]
 pub mod export;
-pub mod exposure;
-pub mod files;
-pub mod fpga;
-pub mod frame_time;
 pub mod heartbeat;
-pub mod identity;
 pub mod imaging;
-pub mod info;
-pub mod integrate;
-pub mod link;
 #[cfg(feature = "pictures")]
 pub mod picture;
-pub mod provenance;
 #[cfg(not(target_family = "wasm"))]
 pub mod reconstruct;
-pub mod recording;
-pub mod replay;
-pub mod response;
 #[cfg(feature = "pictures")]
 pub mod scene;
-pub mod selftest;
-pub mod session;
-pub mod setup;
-pub mod signal;
 #[cfg(not(target_family = "wasm"))]
 pub mod source;
 pub mod stage_times;
-pub mod tally;
 pub mod udev;
-pub mod versions;
+
+#[cfg(test)]
+mod testing;

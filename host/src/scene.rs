@@ -267,7 +267,7 @@ fn shrink(map: Reflectance, size_px: usize) -> Reflectance {
 mod tests {
     use super::*;
     use crate::files::image::encode_grey;
-    use crate::provenance::tests::provenance;
+    use crate::testing::provenance;
 
     fn line(scene: &str) -> String {
         let line = scene.parse::<SceneSource>().unwrap_err().to_string();

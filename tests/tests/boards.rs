@@ -283,13 +283,13 @@ fn every_folder_with_a_memory_layout_is_a_board() {
 
 #[test]
 fn the_list_of_the_host_program_is_that_of_the_files() {
-    let path = root().join("host/src/boards/list.in");
+    let path = root().join("host/files/src/boards/list.in");
     // What `Debug` prints of texts, numbers and `Option`s is Rust.
     let expected = format!("&{:#?}\n", boards());
     if std::env::var_os("NIRSPI_BLESS").is_some() {
         std::fs::write(&path, &expected).expect("a written list");
     }
-    let stale = "host/src/boards/list.in is stale: NIRSPI_BLESS=1 cargo test -p nirspi-tests --test boards writes it anew";
+    let stale = "host/files/src/boards/list.in is stale: NIRSPI_BLESS=1 cargo test -p nirspi-tests --test boards writes it anew";
     assert!(std::fs::read_to_string(&path).unwrap_or_default() == expected, "{stale}");
     assert!(std::env::var_os("NIRSPI_BLESS").is_some() || BOARDS == boards(), "{stale}");
 }

@@ -491,7 +491,7 @@ impl OtgCore {
     }
 
     /// Flips a bit, in the core's memory, of the packet that waits for the host. The byte is not 0 before or afterwards,
-    /// and so many bytes without a 0 lie before it in the packet. Returns whether there is such a byte.
+    /// and the `before` bytes before it in the packet are not 0 either. Returns whether there is such a byte.
     pub fn damage(&mut self, endpoint: usize, before: usize) -> bool {
         self.engine_moves();
         let uses_dma = self.uses_dma();

@@ -14,7 +14,7 @@ pub fn catch() -> io::Result<()> {
     use std::sync::Arc;
     use std::sync::atomic::AtomicBool;
 
-    // The flag is read by nobody: with a handler, the write fails and the program goes on.
+    // Nothing reads the flag. Any handler will do: with one, the write fails and the program goes on.
     signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     let heeded = Signal::ALL.into_iter().filter(|signal| !signal.is_ignored());
     let mut signals = Signals::new(heeded.map(Signal::number))?;

@@ -66,7 +66,14 @@ pub(super) fn write(
                     #[cfg(feature = "enhance")]
                     if let Some(made) = enhancing.enhance(whole, time_ns, &_given)? {
                         let (spread, width) = (made.spread.as_deref(), made.half_width.as_deref());
-                        book.enhanced(time_ns, &made.pixels, spread, width).map_err(io_error)?;
+                        book.enhanced(
+                            time_ns,
+                            nirspi_nets::deblur::SIDE,
+                            &made.pixels,
+                            spread,
+                            width,
+                        )
+                        .map_err(io_error)?;
                     }
                     book.image(time_ns, &image, range)
                 }

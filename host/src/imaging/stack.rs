@@ -357,3 +357,34 @@ fn file_name(path: &Path) -> String {
         .map(|name| name.to_string_lossy().into_owned())
         .unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A header of 16384 x 16384 pixels of one bit took 1.3 GB to be told that it is not 64 x 64.
+    #[test]
+    fn a_picture_of_another_size_is_refused_before_its_pixels_are_decoded() {
+        let headed = |width: u32, height: u32| {
+            let mut bytes = Vec::new();
+            let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
+            encoder.set_depth(::png::BitDepth::One);
+            let mut writer = encoder.write_header().unwrap();
+            // The pixels are missing, which the decoder would tell.
+            writer.write_chunk(::png::chunk::IDAT, &[]).unwrap();
+            drop(writer);
+            bytes
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("in.png");
+        for (width, height) in [(65, 64), (64, 65), (8192, 8192)] {
+            std::fs::write(&path, headed(width, height)).unwrap();
+            let told = ImageStack::read(&path, 64, false).unwrap_err().to_string();
+            let expected = format!("images of {height} x {width} pixels, expected 64 x 64");
+            assert!(told.contains(&expected), "{told}");
+        }
+        std::fs::write(&path, headed(64, 64)).unwrap();
+        let told = ImageStack::read(&path, 64, false).unwrap_err().to_string();
+        assert!(told.contains("damaged or cut short"), "{told}");
+    }
+}

@@ -48,3 +48,6 @@ const BRIGHT: Rgb<u8> = Rgb([236, 238, 242]);
 const MIDDLE: Rgb<u8> = Rgb([176, 181, 191]);
 const DIM: Rgb<u8> = Rgb([146, 152, 164]);
 const AMBER: Rgb<u8> = Rgb([255, 184, 77]);
+
+#[cfg(test)]
+mod tests;

@@ -201,7 +201,7 @@ impl fmt::Display for Pictures {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::provenance::tests::provenance;
+    use crate::testing::provenance;
 
     #[test]
     fn the_range_of_every_picture_is_in_the_report() {

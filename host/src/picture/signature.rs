@@ -35,7 +35,7 @@ pub fn signed_png(picture: &RgbImage, provenance: &Provenance) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::picture::{Axis, Chart};
-    use crate::provenance::tests::provenance;
+    use crate::testing::provenance;
 
     #[test]
     fn a_picture_stays_as_it_is_above_its_line_of_provenance() {

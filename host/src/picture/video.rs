@@ -118,7 +118,7 @@ fn changed(before: &RgbImage, after: &RgbImage) -> (u32, u32, u32, u32) {
 mod tests {
     use super::super::scale::Unit;
     use super::*;
-    use crate::provenance::tests::provenance;
+    use crate::testing::provenance;
     use image::codecs::png::PngDecoder;
     use image::{AnimationDecoder, DynamicImage};
     use std::io::Cursor;

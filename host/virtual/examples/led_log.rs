@@ -27,7 +27,7 @@ impl<F: SimulatedFpga> Logged<F> {
         self.is_on = !self.is_on;
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let word = if self.is_on { "on" } else { "off" };
-        // The camera goes on even if nobody reads its log any more.
+        // Without a reader the log is lost, and the camera goes on.
         writeln!(io::stdout(), "{word} {}", now.as_millis()).unwrap_or_default();
     }
 }
@@ -83,8 +83,8 @@ impl<F: SimulatedFpga> FpgaBus for Logged<F> {
 fn main() -> Result<(), Box<dyn Error>> {
     let letter = "letter:R".parse::<SceneSource>()?.load(64)?;
     let optics = VirtualOptics::before(CameraModel::paper(), &letter, 300.0)?;
-    // Repeated frames leave the processor to the programs under test. Two say how long a frame takes.
-    let fpga = Logged { fpga: PrecomputedFpga::new(optics.fpga(1)?, 2), is_on: false };
+    // One frame, sent again and again, leaves the processor to the programs under test.
+    let fpga = Logged { fpga: PrecomputedFpga::new(optics.fpga(1)?, 1), is_on: false };
     let mut camera = VirtualCamera::new(fpga, optics.depth(1)?, &optics.serial(1));
     let listener = TcpListener::bind("127.0.0.1:0")?;
     println!("{}", listener.local_addr()?);

@@ -2,10 +2,11 @@
 //! the model checker `loom`.
 #![allow(dead_code, reason = "the files have parts that only the program uses")]
 
-#[path = "../../../host/src/account.rs"]
-// Files of `nirspi-serve` name the crate `nirspi`.
+// The files name each other by their own crates.
 extern crate self as nirspi;
+extern crate self as nirspi_camera;
 
+#[path = "../../../host/camera/src/account.rs"]
 pub mod account;
 
 pub mod recording;

@@ -1,6 +1,6 @@
 //! As `nirspi::recording`.
 
-#[path = "../../../host/src/recording/spool.rs"]
+#[path = "../../../host/record/src/recording/spool.rs"]
 mod spool;
 
 use std::io::{self, Write};

@@ -262,7 +262,7 @@ def speech(browser, address):
 
 
 def scene(browser, address):
-    """The drawing is the scene before the camera, whoever has changed it, unless a person draws."""
+    """The drawing is the scene before the camera, also after another page has changed it, unless a person draws."""
     page = browser.new_page()
     page.goto(address)
     seen(page, "image", 32)

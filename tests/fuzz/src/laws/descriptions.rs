@@ -25,9 +25,9 @@ pub const LAWS: &[Law] = &[
         name: "calibrations",
         reads: "a kept calibration (JSON)",
         readers: &[
-            "host/src/calibration/kept.rs",
-            "host/src/calibration/file.rs",
-            "host/src/response.rs",
+            "host/camera/src/calibration/kept.rs",
+            "host/camera/src/calibration/file.rs",
+            "host/camera/src/response.rs",
         ],
         holds: calibrations,
         seeds: || vec![serde_json::to_vec(&calibration()).expect("JSON")],
@@ -38,9 +38,9 @@ pub const LAWS: &[Law] = &[
         name: "flat-fields",
         reads: "a kept flat field (JSON)",
         readers: &[
-            "host/src/calibration/flat/kept.rs",
-            "host/src/calibration/flat/mod.rs",
-            "host/src/calibration/file.rs",
+            "host/camera/src/calibration/flat/kept.rs",
+            "host/camera/src/calibration/flat/mod.rs",
+            "host/camera/src/calibration/file.rs",
         ],
         holds: flat_fields,
         seeds: || vec![flat_field(1024), flat_field(4)],
@@ -50,7 +50,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "orders",
         reads: "an order table (text)",
-        readers: &["host/src/files/order_table.rs", "host/recon/src/rows.rs"],
+        readers: &["host/files/src/order_table.rs", "host/recon/src/rows.rs"],
         holds: orders,
         seeds: order_seeds,
         longest: 6144,
@@ -59,7 +59,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "settings-files",
         reads: "a settings file (TOML)",
-        readers: &["host/src/files/settings.rs"],
+        readers: &["host/files/src/settings.rs"],
         holds: settings_files,
         seeds: settings_seeds,
         longest: 2048,

@@ -17,11 +17,11 @@ pub const LAWS: &[Law] = &[
         name: "measurements",
         reads: "a measurement file as it comes: `.npz`, `.npy`, `.mat`, HDF5, text",
         readers: &[
-            "host/src/files/fields.rs",
-            "host/src/files/archive.rs",
-            "host/src/files/mat.rs",
-            "host/src/files/hdf5.rs",
-            "host/src/files/text.rs",
+            "host/files/src/fields.rs",
+            "host/files/src/archive.rs",
+            "host/files/src/mat.rs",
+            "host/files/src/hdf5.rs",
+            "host/files/src/text.rs",
         ],
         holds: files,
         seeds: file_seeds,
@@ -32,15 +32,15 @@ pub const LAWS: &[Law] = &[
         name: "measurement-fields",
         reads: "the arrays of a `.npz` archive, each as it comes",
         readers: &[
-            "host/src/files/measurement/opened.rs",
-            "host/src/files/measurement/layout.rs",
-            "host/src/files/measurement/readings.rs",
-            "host/src/files/measurement/reference.rs",
-            "host/src/files/measurement/rows.rs",
-            "host/src/files/measurement/stack.rs",
-            "host/src/files/array.rs",
-            "host/src/files/stored.rs",
-            "host/src/files/problem.rs",
+            "host/files/src/measurement/opened.rs",
+            "host/files/src/measurement/layout.rs",
+            "host/files/src/measurement/readings.rs",
+            "host/files/src/measurement/reference.rs",
+            "host/files/src/measurement/rows.rs",
+            "host/files/src/measurement/stack.rs",
+            "host/files/src/array.rs",
+            "host/files/src/stored.rs",
+            "host/files/src/problem.rs",
         ],
         holds: fields,
         seeds: field_seeds,
@@ -50,7 +50,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "matlab",
         reads: "a `.mat` file of level 5",
-        readers: &["host/src/files/mat.rs"],
+        readers: &["host/files/src/mat.rs"],
         holds: files,
         seeds: || vec![small("level5.mat"), small("level5_compressed.mat")],
         longest: 4096,
@@ -59,7 +59,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "hdf5",
         reads: "an HDF5 file, MATLAB's `.mat` 7.3 among them",
-        readers: &["host/src/files/hdf5.rs"],
+        readers: &["host/files/src/hdf5.rs"],
         holds: files,
         seeds: || vec![small("h5py.h5"), small("level73.mat")],
         longest: 12_288,
@@ -68,7 +68,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "arrays",
         reads: "an `.npy` array",
-        readers: &["host/src/files/npy.rs", "host/src/files/array.rs"],
+        readers: &["host/files/src/npy.rs", "host/files/src/array.rs"],
         holds: arrays,
         seeds: array_seeds,
         longest: 2048,
@@ -77,7 +77,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "tables",
         reads: "a table of numbers: text, CSV, with decimal points or commas",
-        readers: &["host/src/files/table.rs", "host/src/files/text.rs"],
+        readers: &["host/files/src/table.rs", "host/files/src/text.rs"],
         holds: tables,
         seeds: table_seeds,
         longest: 2048,
@@ -90,7 +90,7 @@ const MEMORY: usize = 1536 * MIB;
 
 /// A file of SciPy or h5py, from the tests of the readers.
 fn small(name: &str) -> Vec<u8> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../host/src/files/small");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../host/files/src/small");
     std::fs::read(Path::new(folder).join(name)).expect("a file of the readers' tests")
 }
 

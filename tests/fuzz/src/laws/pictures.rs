@@ -11,7 +11,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "png",
         reads: "a PNG, the checksums of its chunks right or as they come",
-        readers: &["host/src/files/image.rs", "host/src/files/image/labelled.rs"],
+        readers: &["host/files/src/image.rs", "host/files/src/image/labelled.rs"],
         holds: png,
         seeds: png_seeds,
         longest: 2048,
@@ -20,7 +20,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "jpeg",
         reads: "a JPEG, with its note which side is up",
-        readers: &["host/src/files/image.rs"],
+        readers: &["host/files/src/image.rs"],
         holds: picture,
         seeds: jpeg_seeds,
         longest: 2048,

@@ -39,7 +39,7 @@ pub const LAWS: &[Law] = &[
             "mcu/wire/src/identity.rs",
             "mcu/wire/src/samples.rs",
             "mcu/wire/src/tail.rs",
-            "host/src/events.rs",
+            "host/camera/src/events.rs",
         ],
         holds: messages,
         seeds: message_seeds,

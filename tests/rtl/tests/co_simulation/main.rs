@@ -75,7 +75,7 @@ struct Told {
 }
 
 impl Told {
-    /// Of the bytes of a read: zeros, a packet of so many patterns, zeros.
+    /// Takes the packet of `patterns` patterns out of the bytes of one read, which has zeros before and after it.
     fn of(read: &[u8], patterns: usize) -> Self {
         let place = [Width::Bits24, Width::Bits32]
             .into_iter()

@@ -1,0 +1,192 @@
+//! The tally of one run, live or from a recording: sums the frames of its packets and makes their
+//! account.
+//!
+//! A recording gives the same tally as the capture that made it.
+
+use crate::account::{Arrival, Check, LossAccount};
+use crate::integrate::Integrated;
+use crate::setup::MeasurementSetup;
+use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError};
+use thiserror::Error;
+
+/// The sum and the account of a run's packets.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    /// The run that counts; `None` means the run of the first frame.
+    run: Option<u16>,
+    differential: bool,
+    account: LossAccount,
+    integrated: Integrated,
+    /// How the first invalid frame contradicts the setup.
+    misfit: Option<Misfit>,
+    /// The number of frames that the camera reported at the end of the run.
+    said: Option<u32>,
+    device_time_us: u64,
+    /// Number of intact messages of a newer protocol version.
+    unknown: u64,
+}
+
+/// How an intact frame contradicts the setup.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Misfit {
+    /// The number of patterns differs.
+    #[error("frames of {found} patterns, expected {expected} by the setup")]
+    Patterns {
+        /// Number of samples of the frame.
+        found: usize,
+        /// Number of patterns of the setup.
+        expected: usize,
+    },
+    /// The frame has differences and the setup single patterns, or the reverse.
+    #[error(
+        "frames of {}, expected {} by the setup",
+        kind_of_samples(*.differential),
+        kind_of_samples(!*.differential)
+    )]
+    Differential {
+        /// Whether the frame has differences.
+        differential: bool,
+    },
+    /// The frame sums no sweep, so its samples are not measurements.
+    #[error("frames of 0 sweeps, expected at least 1")]
+    NoSweep,
+}
+
+fn kind_of_samples(differential: bool) -> &'static str {
+    if differential { "differences of patterns and complements" } else { "single patterns" }
+}
+
+impl Tally {
+    /// An empty tally. Frames of another run than `run` are stragglers of earlier runs and do not
+    /// count. With `None`, the run of the first frame counts.
+    #[must_use]
+    pub fn new(setup: &MeasurementSetup, run: Option<u16>) -> Self {
+        Self {
+            run,
+            differential: setup.differential,
+            account: LossAccount::new(),
+            integrated: Integrated::new(setup),
+            misfit: None,
+            said: None,
+            device_time_us: 0,
+            unknown: 0,
+        }
+    }
+
+    /// Counts a packet. Returns whether the packet was a frame that was added to the sum.
+    pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
+        match content {
+            Ok(DeviceMessage::Frame(frame)) => return self.frame(frame),
+            Ok(DeviceMessage::Event(event)) => match event.kind {
+                EventKind::RunEnded { run, frames_made, .. }
+                    if self.run.is_none_or(|own| own == run) =>
+                {
+                    self.end(frames_made);
+                }
+                _ => {}
+            },
+            Ok(_) => {}
+            Err(PacketError::Message) => self.unknown += 1,
+            Err(PacketError::BufferTooSmall | PacketError::TooLong) => {
+                self.account.damaged(Check::Length);
+            }
+            Err(PacketError::Cobs) => self.account.damaged(Check::Cobs),
+            Err(PacketError::Crc) => self.account.damaged(Check::Crc),
+        }
+        false
+    }
+
+    fn frame(&mut self, frame: &Frame<'_>) -> bool {
+        if *self.run.get_or_insert(frame.run) != frame.run {
+            return false;
+        }
+        self.device_time_us = self.device_time_us.max(frame.device_time_us);
+        if let Some(misfit) = self.misfit_of(frame) {
+            // An intact frame that does not fit the setup counts as damaged.
+            self.misfit.get_or_insert(misfit);
+            self.account.damaged(Check::Setup);
+            return false;
+        }
+        let received = self.account.frame(frame.sequence) == Arrival::Received;
+        if received {
+            self.integrated.add(frame);
+        }
+        received
+    }
+
+    fn misfit_of(&self, frame: &Frame<'_>) -> Option<Misfit> {
+        let differential = frame.flags.contains(FrameFlags::DIFFERENTIAL);
+        if !self.integrated.fits(frame) {
+            let (found, expected) = (frame.samples.len(), self.integrated.patterns());
+            Some(Misfit::Patterns { found, expected })
+        } else if differential != self.differential {
+            Some(Misfit::Differential { differential })
+        } else {
+            (frame.sweeps == 0).then_some(Misfit::NoSweep)
+        }
+    }
+
+    /// Records the end of the run and the number of frames that the camera reported.
+    pub fn end(&mut self, frames_made: u32) {
+        self.account.made(frames_made);
+        self.said = Some(frames_made);
+    }
+
+    /// Number of frames that the camera reported, after the end of the run. The camera counts in 32
+    /// bits; the account counts further.
+    #[must_use]
+    pub fn made(&self) -> Option<u64> {
+        let accounted = self.account.accounted();
+        self.said.map(|said| if said == accounted as u32 { accounted } else { u64::from(said) })
+    }
+
+    /// How the first invalid frame contradicts the setup; `None` if all frames fit.
+    #[must_use]
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.misfit
+    }
+
+    /// Whether the camera has reported the end of the run.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.said.is_some()
+    }
+
+    /// Whether any packet of the run, whole or damaged, has arrived.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.account.accounted() > 0 || self.account.failed_checks().packets() > 0
+    }
+
+    /// The camera's time of the newest frame.
+    #[must_use]
+    pub fn device_time_us(&self) -> u64 {
+        self.device_time_us
+    }
+
+    /// The account of the frames.
+    #[must_use]
+    pub fn account(&self) -> &LossAccount {
+        &self.account
+    }
+
+    /// Frames that arrived, in order or late.
+    #[must_use]
+    pub fn arrived(&self) -> u64 {
+        let counters = self.account.counters();
+        counters.received + counters.late
+    }
+
+    /// Number of intact messages that this program does not know. The messages are skipped, because
+    /// a newer camera may send them.
+    #[must_use]
+    pub fn unknown_packets(&self) -> u64 {
+        self.unknown
+    }
+
+    /// The sum of the frames received in order.
+    #[must_use]
+    pub fn integrated(&self) -> &Integrated {
+        &self.integrated
+    }
+}

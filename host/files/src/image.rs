@@ -1,0 +1,293 @@
+//! Grey pictures: PNG and JPEG in, PNG out.
+//!
+//! A grey level is the value: v / 255 (or v / 65 535), in both directions, without linearisation.
+//! Test scenes and data sets of the field use the same convention. A written file reads back as it
+//! was written (`tests::all_256_grey_levels_survive_a_round_trip`), and metrics against a user's
+//! own file use the user's numbers. Undoing the tone curve of a photograph would not give a
+//! reflectance at 1550 nm: a visible picture does not show what a surface reflects there.
+//!
+//! A picture with labels that this program has written (title, grey bar, warnings) is read as the
+//! image in it.
+
+mod labelled;
+mod signed;
+
+use super::FileError;
+use super::plain::{MAX_MEMORY_BYTES, kind_by_start, open_file};
+use crate::provenance::Provenance;
+use ::image::imageops::{self, FilterType};
+use ::image::metadata::Orientation;
+use ::image::{
+    ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, ImageReader,
+    Limits, Luma, RgbImage,
+};
+use std::io::{BufRead, BufReader, Seek};
+use std::path::{Path, PathBuf};
+
+pub use labelled::{Placed, encode_labelled};
+pub use signed::provenance_of;
+pub use signed::sign;
+
+const EXPECTED: &str = "a PNG or JPEG image";
+
+/// A square map of reflectance in `[0, 1]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reflectance {
+    /// Edge in pixels, at least 1.
+    pub size_px: usize,
+    /// `size_px * size_px` values, row-major.
+    pub values: Vec<f32>,
+}
+
+/// Reads a JPEG, or a PNG of any kind (grey, RGB, palette, with or without alpha, up to 16 bit) as
+/// reflectance.
+///
+/// Colour becomes Rec. 709 luma (0.2126 R + 0.7152 G + 0.0722 B of the stored values). Transparent
+/// pixels show a black ground. A picture that is not square is cropped to its centre.
+///
+/// # Errors
+/// [`FileError`], one line that names file, what was found and what was expected.
+pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
+    let picture = decode(path, |_| Ok(()))?;
+    let (width, height) = (picture.width(), picture.height());
+    let edge = width.min(height);
+    let corner = ((width - edge) / 2, (height - edge) / 2);
+    Ok(Reflectance { size_px: edge as usize, values: grey_of(&picture, corner, (edge, edge)) })
+}
+
+/// A grey picture in `[0, 1]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grey {
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+    /// `width * height` values, row-major.
+    pub values: Vec<f32>,
+}
+
+/// Reads a PNG or JPEG of any kind as [`read_reflectance`] does, but of any shape and without
+/// cropping.
+///
+/// # Errors
+/// [`FileError`], one line that names file, what was found and what was expected.
+pub fn read_grey(path: &Path) -> Result<Grey, FileError> {
+    read_grey_if(path, |_| Ok(()))
+}
+
+/// As [`read_grey`], for a caller that needs pictures of a certain size: `fits` judges width and height, in pixels,
+/// before the pixels are decoded.
+///
+/// # Errors
+/// As [`read_grey`], and the errors of `fits`.
+pub fn read_grey_if<E: From<FileError>>(
+    path: &Path,
+    fits: impl FnOnce((u32, u32)) -> Result<(), E>,
+) -> Result<Grey, E> {
+    let picture = decode(path, fits)?;
+    Ok(Grey { width: picture.width(), height: picture.height(), values: grey(&picture) })
+}
+
+impl Grey {
+    /// The picture's central square, averaged down or interpolated to `side_px` pixels an edge.
+    /// Values stay in `[0, 1]`.
+    ///
+    /// # Panics
+    /// If `side_px` is 0.
+    #[must_use]
+    pub fn resized(&self, side_px: u32) -> Self {
+        assert!(side_px > 0, "a picture of 0 pixels");
+        let edge = self.width.min(self.height);
+        let picture: ImageBuffer<Luma<f32>, _> =
+            ImageBuffer::from_raw(self.width, self.height, self.values.clone())
+                .expect("as many values as pixels");
+        let (left, top) = ((self.width - edge) / 2, (self.height - edge) / 2);
+        let square = imageops::crop_imm(&picture, left, top, edge, edge).to_image();
+        let scaled = imageops::resize(&square, side_px, side_px, FilterType::Triangle);
+        let values = scaled.into_raw().into_iter().map(|value| value.clamp(0.0, 1.0)).collect();
+        Self { width: side_px, height: side_px, values }
+    }
+}
+
+/// Decodes a picture. Its header says how much memory its pixels and their grey levels take, and `fits` may refuse its
+/// size; both are judged before a pixel is decoded.
+fn decode<E: From<FileError>>(
+    path: &Path,
+    fits: impl FnOnce((u32, u32)) -> Result<(), E>,
+) -> Result<DynamicImage, E> {
+    let (file, _) = open_file(path, EXPECTED)?;
+    let read = |error| FileError::io(path, "read", error);
+    let mut stream = BufReader::new(file);
+    let start = stream.fill_buf().map_err(read)?;
+    let format = ::image::guess_format(start).ok();
+    let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = format else {
+        // The signature goes on behind what names the kind.
+        let found = match start.starts_with(b"\x89PNG") {
+            true => "a PNG image with a damaged signature",
+            false => kind_by_start(start),
+        };
+        return Err(FileError::kind(path, found, EXPECTED).into());
+    };
+    stream.rewind().map_err(read)?;
+    let labels = match format {
+        ImageFormat::Png => labelled::labels_of(&mut stream),
+        _ => None,
+    };
+    stream.rewind().map_err(read)?;
+    let wrong = |(found, expected): (String, &'static str)| FileError::kind(path, found, expected);
+    let labels = labels.transpose().map_err(|e| wrong((format!("labels: {e}"), EXPECTED)))?;
+
+    let damaged = |error: ImageError| match error {
+        ImageError::Limits(_) => too_large(path, None),
+        error => FileError::Damaged {
+            path: path.to_owned(),
+            found: error.to_string(),
+            expected: EXPECTED,
+        },
+    };
+    let mut reader = ImageReader::with_format(stream, format);
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(MAX_MEMORY_BYTES);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(damaged)?;
+    // A phone stores the picture as its sensor was held, and the file states which side is up.
+    let orientation = decoder.orientation().map_err(damaged)?;
+    let (width, height) = match (decoder.dimensions(), orientation) {
+        (
+            (width, height),
+            Orientation::Rotate90
+            | Orientation::Rotate270
+            | Orientation::Rotate90FlipH
+            | Orientation::Rotate270FlipH,
+        ) => (height, width),
+        (stored, _) => stored,
+    };
+    let grey_bytes = u64::from(width) * u64::from(height) * size_of::<f32>() as u64;
+    if decoder.total_bytes().saturating_add(grey_bytes) > MAX_MEMORY_BYTES {
+        return Err(too_large(path, Some((width, height))).into());
+    }
+    // The image in a picture with labels is smaller.
+    if labels.is_none() {
+        fits((width, height))?;
+    }
+    let mut picture = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    picture.apply_orientation(orientation);
+    match labels {
+        None => Ok(picture),
+        Some(labels) => Ok(labelled::image_in(&picture, &labels).map_err(wrong)?),
+    }
+}
+
+/// The error for a picture that takes more memory than [`MAX_MEMORY_BYTES`].
+fn too_large(path: &Path, size: Option<(u32, u32)>) -> FileError {
+    let size = size.map(|(width, height)| format!(" ({width} x {height} pixels)"));
+    let found = format!("an image that is too large{}", size.unwrap_or_default());
+    FileError::kind(path, found, "at most 512 MiB in memory, decoded and as grey levels of 4 bytes")
+}
+
+/// The ending of pictures for people beside results for programs. Folders are read without them.
+pub const FOR_PEOPLE: &str = ".picture.png";
+
+/// Whether a file's name is that of a PNG or JPEG.
+#[must_use]
+pub fn is_picture(path: &Path) -> bool {
+    let has = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    ["png", "jpg", "jpeg"].into_iter().any(has)
+}
+
+/// The PNG and JPEG files of a folder, sorted by name, without the pictures for people.
+///
+/// # Errors
+/// [`FileError`] if the folder cannot be read.
+pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let io = |system| FileError::io(folder, "read", system);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let file = entry.map_err(io)?.path();
+        let for_people = file.to_string_lossy().ends_with(FOR_PEOPLE);
+        if is_picture(&file) && !for_people {
+            files.push(file);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// The picture's grey levels, 0 to 1.
+fn grey(picture: &DynamicImage) -> Vec<f32> {
+    grey_of(picture, (0, 0), (picture.width(), picture.height()))
+}
+
+/// The grey levels of a part of the picture, 0 to 1. Colour is converted line by line, because 16
+/// bytes a pixel of a whole picture are far more than its file.
+fn grey_of(picture: &DynamicImage, corner: (u32, u32), size: (u32, u32)) -> Vec<f32> {
+    let mut levels = Vec::with_capacity(size.0 as usize * size.1 as usize);
+    for row in 0..size.1 {
+        let line = picture.crop_imm(corner.0, corner.1 + row, size.0, 1);
+        match line.color() {
+            // A grey picture is converted directly, because a conversion through colour would round.
+            ColorType::L8 | ColorType::L16 => levels.extend(line.to_luma32f().into_raw()),
+            _ => levels.extend(line.to_rgba32f().pixels().map(|pixel| {
+                let [r, g, b, alpha] = pixel.0;
+                ((0.2126 * r + 0.7152 * g + 0.0722 * b) * alpha).clamp(0.0, 1.0)
+            })),
+        }
+    }
+    levels
+}
+
+/// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major, with their provenance. Values outside the range are
+/// clipped; NaN becomes black.
+///
+/// # Panics
+/// If there are not exactly `width * height` values, or none.
+#[must_use]
+pub fn encode_grey(
+    width: usize,
+    height: usize,
+    values: &[f32],
+    provenance: &Provenance,
+) -> Vec<u8> {
+    assert_eq!(width * height, values.len(), "values of a {width} x {height} picture");
+    let levels: Vec<u8> = values.iter().map(|&value| to_level(value)).collect();
+    encode(&levels, (width as u32, height as u32), png::ColorType::Grayscale, provenance)
+}
+
+/// The bytes of an 8-bit colour PNG with its provenance.
+///
+/// # Panics
+/// If the picture has no pixel.
+#[must_use]
+pub fn encode_rgb(picture: &RgbImage, provenance: &Provenance) -> Vec<u8> {
+    encode(picture.as_raw(), picture.dimensions(), png::ColorType::Rgb, provenance)
+}
+
+/// The 8-bit grey level of a value in `[0, 1]`; NaN is black.
+#[must_use]
+pub fn to_level(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+fn encode(
+    levels: &[u8],
+    (width, height): (u32, u32),
+    color: png::ColorType,
+    provenance: &Provenance,
+) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let encoded = (|| {
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(color);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Fast);
+        sign(&mut encoder, provenance)?;
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(levels)?;
+        writer.finish()
+    })();
+    encoded.expect("a picture of at least one pixel encodes into memory");
+    bytes
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,236 @@
+//! An open file whose shapes fit together, and its measurements one by one.
+
+use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
+use super::reference::read_reference;
+use super::rows::{read_rows, read_side, shown};
+use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Selection};
+use crate::fields::{Field, Fields};
+use nirspi_recon::law::{Claim, OVERLOAD};
+use nirspi_recon::{Image, Rows, Side};
+use std::path::Path;
+
+/// An open file whose shapes fit together.
+pub(super) struct Opened {
+    pub(super) fields: Fields,
+    pub(super) side: Side,
+    /// The row shown k-th; `None` for a row that was not read.
+    rows: Vec<Option<u32>>,
+    /// All rows, if each was read: the measurements share them.
+    pub(super) every_row: Option<Rows>,
+    pub(super) form: Form,
+    side_guessed: bool,
+    pub(super) readings: NamedReadings,
+    reference: Option<(Field, usize)>,
+    pub(super) simulated: Option<bool>,
+    noise: Option<f64>,
+    pub(super) notes: Vec<String>,
+}
+
+/// An open file whose readings are in memory.
+pub(super) struct Loaded<'o> {
+    opened: &'o Opened,
+    numbers: Field,
+}
+
+impl Opened {
+    pub(super) fn open(path: &Path, want: &Selection) -> Result<Self, FileError> {
+        let mut fields = Fields::open(path, want.decimal_comma)?;
+        let side = read_side(&mut fields, want)?;
+        let has_rows = fields.holds("h_row");
+        if has_rows && want.shown.is_some() {
+            return Err(FileError::field(path, "h_row", "is in the file", "no --shown beside it"));
+        }
+        if !has_rows && want.shown.is_none() {
+            let expected =
+                "n, h_row, and y or d; or --shown ORDER for patterns shown in a known order";
+            let found = found_names(&fields);
+            return Err(FileError::Missing {
+                path: path.to_owned(),
+                field: "h_row",
+                found,
+                expected,
+            });
+        }
+        let name = readings_field(&fields, want)?;
+        let is_d = name == "d";
+        let default = if name == "d" { Form::Differences } else { Form::Pairs };
+        let form = want.form.unwrap_or(default);
+        let mut notes = Vec::new();
+        let side_guessed = side.is_none();
+        let (side, mut rows, readings) = match &want.shown {
+            None => {
+                let Some(side) = side else {
+                    let (path, found) = (path.to_owned(), found_names(&fields));
+                    let expected = "n, h_row, and y or d; or --side N";
+                    return Err(FileError::Missing { path, field: "n", found, expected });
+                };
+                let rows = read_rows(&mut fields, side)?;
+                let expected = expected_of(form, rows.len());
+                (side, rows, NamedReadings::open(&mut fields, name, want, &expected)?)
+            }
+            Some(order) => {
+                let entry = order.entry().filter(|entry| entry.has_undefined_ties);
+                notes.extend(entry.map(|entry| format!(
+                    "{} leaves the order of equal patterns of {order} to an unstable sort: an h_row or --shown table:FILE \
+                     of the patterns as they were shown is exact",
+                    entry.package.unwrap_or("its package")
+                )));
+                shown(&mut fields, name, want, form, side, order)?
+            }
+        };
+        if want.transpose {
+            let n = side.pixels() as u32;
+            for row in rows.iter_mut().flatten() {
+                *row = (*row % n) * n + *row / n;
+            }
+        }
+        let reference =
+            read_reference(&mut fields, side, readings.layout.count).unwrap_or_else(|error| {
+                notes.push(format!("not compared with the reconstruction in the file: {error}"));
+                None
+            });
+        let simulated = read_simulated(&mut fields);
+        let noise = is_d.then(|| read_noise(&mut fields)).flatten();
+        // A list that is not sound is refused with the first measurement.
+        let every_row: Option<Vec<u32>> = rows.iter().copied().collect();
+        let every_row = every_row.and_then(|rows| Rows::new(side, rows).ok());
+        Ok(Self {
+            fields,
+            side,
+            rows,
+            every_row,
+            form,
+            side_guessed,
+            readings,
+            reference,
+            simulated,
+            noise,
+            notes,
+        })
+    }
+
+    /// Number of patterns, those that were not read included.
+    pub(super) fn patterns(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The file with its readings in memory.
+    pub(super) fn loaded(&mut self) -> Result<Loaded<'_>, FileError> {
+        let numbers = self.readings.numbers(&mut self.fields)?;
+        Ok(Loaded { opened: self, numbers })
+    }
+
+    /// A measurement without any pattern that was read.
+    pub(super) fn no_pattern(&self) -> FileError {
+        let found = "has no pattern that was read: all are NaN or too large";
+        FileError::field(self.fields.path(), self.readings.name.clone(), found, "finite readings")
+    }
+
+    /// The file's own reconstruction of the measurement of this index.
+    pub(super) fn reference(&self, index: usize) -> Option<Reference> {
+        let (field, count) = self.reference.as_ref()?;
+        let area = self.side.area();
+        let start = if *count == 1 { 0 } else { index * area };
+        let image = |values: &Vec<f64>| {
+            let pixels = values[start..start + area].iter().map(|&value| value as f32);
+            Image::new(self.side, pixels.collect())
+        };
+        Some(Reference { real: image(&field.real), imaginary: field.imaginary.as_ref().map(image) })
+    }
+}
+
+impl Loaded<'_> {
+    /// The measurement of this index, without the patterns that were not read.
+    pub(super) fn measurement(&self, index: usize) -> Result<MeasurementFile, FileError> {
+        let Self { opened, numbers } = self;
+        let path = opened.fields.path();
+        let NamedReadings { name, layout, .. } = &opened.readings;
+        let real = layout.series(&numbers.real, index);
+        let imaginary = numbers.imaginary.as_ref().map(|values| layout.series(values, index));
+        for values in [Some(&real), imaginary.as_ref()].into_iter().flatten() {
+            check_infinite(path, name, values)?;
+        }
+        let count = opened.rows.len();
+        let at = |k: usize| {
+            let (first, second) = match opened.form {
+                Form::Pairs => (2 * k, Some(2 * k + 1)),
+                Form::Halves => (k, Some(count + k)),
+                Form::Single | Form::Differences => (k, None),
+            };
+            std::iter::once(first).chain(second)
+        };
+        let is_read = |k: usize| {
+            let finite = |values: &[f64]| at(k).all(|reading| is_reading(values[reading]));
+            opened.rows[k].is_some() && finite(&real) && imaginary.as_deref().is_none_or(finite)
+        };
+        let (places, not_read): (Vec<usize>, Vec<usize>) = (0..count).partition(|&k| is_read(k));
+        if places.is_empty() {
+            return Err(opened.no_pattern());
+        }
+        let overloaded = |k: &usize| real[*k].abs() >= OVERLOAD;
+        let overloads = (0..real.len()).filter(overloaded).collect();
+        let as_they_are = not_read.is_empty() && opened.form != Form::Halves;
+        let kept = |values: Vec<f64>| -> Readings {
+            let values = match as_they_are {
+                true => values,
+                false => places.iter().flat_map(|&k| at(k)).map(|at| values[at]).collect(),
+            };
+            match opened.form {
+                Form::Pairs | Form::Halves => Readings::Pairs(values),
+                Form::Single => Readings::Single(values),
+                Form::Differences => Readings::Differential(values),
+            }
+        };
+        let h_row = match &opened.every_row {
+            Some(every) if not_read.is_empty() => every.clone(),
+            _ => {
+                let rows = places.iter().filter_map(|&k| opened.rows[k]);
+                Rows::new(opened.side, rows).map_err(|error| {
+                    FileError::field(path, "h_row", format!("({error})"), "each row once")
+                })?
+            }
+        };
+        Ok(MeasurementFile {
+            h_row,
+            readings: kept(real),
+            imaginary: imaginary.map(kept),
+            places,
+            not_read,
+            overloads,
+            claim: Claim { form: opened.form, side_guessed: opened.side_guessed },
+            patterns: count,
+            reference: opened.reference(index),
+            simulated: opened.simulated,
+            noise: opened.noise,
+            notes: opened.notes.clone(),
+        })
+    }
+}
+
+/// Whether a number is a reading, and not a sign that there is none.
+pub(super) fn is_reading(value: f64) -> bool {
+    value.abs() < OVERLOAD
+}
+
+/// The noise that the file states for `d`. A field of another kind says nothing.
+fn read_noise(fields: &mut Fields) -> Option<f64> {
+    if fields.is_unnamed() || !fields.holds(NOISE) {
+        return None;
+    }
+    let noise = *fields.read(NOISE, |_| Ok(())).ok()?.real.first()?;
+    (noise.is_finite() && noise >= 0.0).then_some(noise)
+}
+
+/// Whether the file says that no real light was measured. A field of another kind says nothing.
+fn read_simulated(fields: &mut Fields) -> Option<bool> {
+    const FIELD: &str = "simulated";
+    if fields.is_unnamed() || !fields.holds(FIELD) {
+        return None;
+    }
+    let one = |shape: &[u64]| match shape.iter().all(|&axis| axis == 1) {
+        true => Ok(()),
+        false => Err("one number".to_owned()),
+    };
+    let field = fields.read(FIELD, one).ok()?;
+    field.real.first().map(|&value| value != 0.0)
+}

@@ -1,0 +1,159 @@
+//! The side of the image and the row shown k-th, from the file or from the order that the user
+//! names.
+
+use super::form::meaning;
+use super::layout::Layout;
+use super::readings::NamedReadings;
+use super::{FileError, Form, Selection};
+use crate::array::has_shape;
+use crate::fields::{Fields, UNNAMED};
+use nirspi_recon::{Order, Rows, RowsError, Side};
+
+/// Side, rows and readings of a file that states neither side nor rows and was shown in this order.
+pub(super) fn shown(
+    fields: &mut Fields,
+    name: String,
+    want: &Selection,
+    form: Form,
+    side: Option<Side>,
+    order: &Order,
+) -> Result<(Side, Vec<Option<u32>>, NamedReadings), FileError> {
+    let path = fields.path().to_owned();
+    let each = form.readings();
+    let label = if fields.is_unnamed() { UNNAMED.to_owned() } else { name.clone() };
+    let refuse =
+        |found: String, expected: String| FileError::field(&path, label.clone(), found, expected);
+    let (shape, numbers) = fields.open_field(&name, |shape| match shape.contains(&0) {
+        true => Err("readings".to_owned()),
+        false => Ok(()),
+    })?;
+    let mut axes = shape.iter().copied().filter(|&axis| axis != 1);
+    let along = if want.patterns_first { axes.next() } else { axes.next_back() };
+    let length = along.unwrap_or(1) as usize;
+    if !length.is_multiple_of(each) {
+        let expected = format!("an even number: {}", meaning(form));
+        return Err(refuse(format!("has {length} readings a measurement"), expected));
+    }
+    let count = length / each;
+    let side = match side {
+        Some(side) => side,
+        None => {
+            let side = Side::new(count.isqrt() as u64).ok().filter(|side| side.area() == count);
+            side.ok_or_else(|| {
+                let single = Side::new(length.isqrt() as u64).ok().filter(|side| side.area() == length);
+                let hint = match single {
+                    Some(_) if each == 2 => {
+                        "; one value a pattern is read with --readings single or --readings differences"
+                    }
+                    _ => "",
+                };
+                refuse(
+                    format!("has {length} readings, of {count} patterns ({})", meaning(form)),
+                    format!("those of a full sweep of n * n patterns, n a power of two, or --side N{hint}"),
+                )
+            })?
+        }
+    };
+    let (n, area) = (side.pixels(), side.area());
+    if count > area {
+        let found = format!("has {length} readings, of {count} patterns ({})", meaning(form));
+        return Err(refuse(found, format!("at most {area} patterns for n = {n}")));
+    }
+    let rows = order.rows(side).map_err(|error| {
+        let found = format!("({error})");
+        FileError::field(
+            &path,
+            "--shown",
+            found,
+            format!("an order of the {area} patterns for n = {n}"),
+        )
+    })?;
+    let layout = Layout::of(&shape, length, want.patterns_first)
+        .ok_or_else(|| refuse(has_shape(&shape), "readings".to_owned()))?;
+    let rows = rows.iter().take(count).map(|&row| Some(row)).collect();
+    Ok((side, rows, NamedReadings::new(label.clone(), layout, numbers)))
+}
+
+pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<Side>, FileError> {
+    const EXPECTED: &str = "a power of two from 2 to 256";
+    if !fields.holds("n") {
+        return Ok(want.side);
+    }
+    let is_columns = fields.is_columns();
+    let n = fields.read_real("n", |shape| match shape.iter().all(|&axis| axis == 1) {
+        false if !is_columns => Err("one number".to_owned()),
+        _ => Ok(()),
+    })?;
+    // A column of a text repeats the number in every line.
+    if let Some(line) = n.iter().position(|value| value.to_bits() != n[0].to_bits()) {
+        let found = format!("is {} in row {} of the column, {} before", n[line], line + 1, n[0]);
+        return Err(FileError::field(fields.path(), "n", found, "one number"));
+    }
+    let refuse =
+        |found: String, expected: String| FileError::field(fields.path(), "n", found, expected);
+    let value = n[0];
+    let side = as_integer(value)
+        .and_then(|n| u64::try_from(n).ok())
+        .and_then(|n| Side::new(n).ok())
+        .ok_or_else(|| refuse(format!("is {value}"), EXPECTED.to_owned()))?;
+    match want.side {
+        Some(asked) if asked != side => {
+            Err(refuse(format!("is {value}"), format!("{} as --side says", asked.pixels())))
+        }
+        _ => Ok(Some(side)),
+    }
+}
+
+/// The row shown k-th; `None` for a row that was not read.
+pub(super) fn read_rows(fields: &mut Fields, side: Side) -> Result<Vec<Option<u32>>, FileError> {
+    const FIELD: &str = "h_row";
+    let (n, area) = (side.pixels(), side.area());
+    let numbers = fields.read_real(FIELD, |shape| {
+        let axes: Vec<u64> = shape.iter().copied().filter(|&axis| axis != 1).collect();
+        match axes[..] {
+            [] if !shape.is_empty() => Ok(()),
+            [rows] if (1..=area as u64).contains(&rows) => Ok(()),
+            _ => Err(format!("(M,) with M from 1 to {area} for n = {n}")),
+        }
+    })?;
+    let refuse =
+        |found: String, expected: String| FileError::field(fields.path(), FIELD, found, expected);
+    let expected = || {
+        format!("a whole number from 0 to {} for n = {n}, or negative or NaN if not read", area - 1)
+    };
+    let mut places = Vec::new();
+    let mut rows: Vec<Option<u32>> = Vec::with_capacity(numbers.len());
+    for (k, &value) in numbers.iter().enumerate() {
+        if value.is_nan() || value < 0.0 {
+            rows.push(None);
+            continue;
+        }
+        let row = as_integer(value).and_then(|row| u32::try_from(row).ok());
+        let row = row.ok_or_else(|| refuse(format!("is {value} at [{k}]"), expected()))?;
+        places.push((k, row));
+        rows.push(Some(row));
+    }
+    if places.is_empty() {
+        return Err(refuse("has no row that was read".to_owned(), expected()));
+    }
+    let of_place = |index: usize| places.get(index).map_or(index, |&(k, _)| k);
+    Rows::new(side, places.iter().map(|&(_, row)| row)).map_err(|error| match error {
+        RowsError::OutOfRange { index, found, .. } => {
+            let from_one = found == area as i64 && places.iter().all(|&(_, row)| row > 0);
+            let hint = if from_one { "; counted from 1, each is one too many" } else { "" };
+            refuse(format!("is {found} at [{}]", of_place(index)), format!("{}{hint}", expected()))
+        }
+        RowsError::Repeated { index, first, row } => {
+            let (index, first) = (of_place(index), of_place(first));
+            let found = format!("repeats row {row} at [{index}], first at [{first}]");
+            refuse(found, "each row once".to_owned())
+        }
+        other => refuse(other.to_string(), expected()),
+    })?;
+    Ok(rows)
+}
+
+/// The whole number that a float represents. Every row number and side is exact in float64.
+fn as_integer(value: f64) -> Option<i64> {
+    (value.fract() == 0.0 && value.abs() < 2f64.powi(53)).then_some(value as i64)
+}

@@ -1,0 +1,37 @@
+//! Writes measurements of nirspi as a file for other programs: NumPy `.npz`.
+
+use super::FileError;
+use crate::provenance::Provenance;
+use crate::{archive, npy};
+use nirspi_recon::Measurements;
+use std::path::Path;
+
+/// The field of an `.npz` file with its provenance, as JSON text.
+pub const PROVENANCE: &str = "provenance";
+
+/// The field with the standard deviation of the noise of `d`, if it is known.
+pub const NOISE: &str = "noise";
+
+/// The bytes of a `.npz` file with `n`, `h_row`, `d`, its `noise` if that is known, and the provenance as
+/// JSON text. `simulated` is 1 if no real light was measured, and is left out if that is not known.
+///
+/// # Errors
+/// [`FileError`] naming `path`, if the archive cannot be written.
+pub fn encode(
+    path: &Path,
+    measurements: &Measurements,
+    provenance: &Provenance,
+) -> Result<Vec<u8>, FileError> {
+    let rows: Vec<i64> = measurements.rows().iter().map(|&row| row.into()).collect();
+    let count = [rows.len()];
+    let mut members = vec![
+        ("n", npy::encode(&[], &[measurements.side().pixels() as i64])),
+        ("h_row", npy::encode(&count, &rows)),
+        ("d", npy::encode(&count, measurements.values())),
+        (PROVENANCE, npy::encode_text(&provenance.json())),
+    ];
+    let simulated = provenance.taken.simulated();
+    members.extend(measurements.noise().map(|noise| (NOISE, npy::encode(&[], &[noise]))));
+    members.extend(simulated.map(|s| ("simulated", npy::encode(&[], &[i64::from(s)]))));
+    archive::encode(path, &members)
+}

@@ -1,0 +1,140 @@
+//! Writes a recording while the packets arrive.
+//!
+//! The disk has a thread of its own behind a queue (`spool`), so the thread that reads the camera waits
+//! for the disk only when the queue is full.
+
+use super::RunAccount;
+use super::book::{Book, Opening};
+use super::file::{Place, Target};
+use super::spool::{self, Disk, Spool};
+use nirspi_camera::response::Settling;
+use nirspi_camera::setup::MeasurementSetup;
+use nirspi_camera::tally::Tally;
+use nirspi_files::identity::CameraIdentity;
+use nirspi_wire::{DeviceMessage, PacketError};
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// The longest time after which packets are handed to the disk's queue.
+const FLUSH_EVERY: Duration = Duration::from_millis(500);
+
+/// An open recording.
+pub struct Recorder {
+    place: Place,
+    book: Book<Spool>,
+    /// Behind the book, whose end ends the disk's thread.
+    disk: Disk,
+    /// The same file, for syncing to the disk.
+    file: File,
+    epoch: u64,
+    started: Instant,
+    flushed: Instant,
+    /// Time of the newest packet.
+    newest: u64,
+}
+
+impl Recorder {
+    /// Makes the file and writes identity and setup. `run` is the number of the run whose frames
+    /// count.
+    ///
+    /// # Errors
+    /// If the file exists, or cannot be made or written. A file that could not be written is
+    /// removed.
+    pub fn create(
+        target: &Target,
+        identity: &CameraIdentity,
+        setup: &MeasurementSetup,
+        settling: Option<&Settling>,
+        run: Option<u16>,
+    ) -> io::Result<Self> {
+        let (place, file) = Place::make(target)?;
+        let begun = file.try_clone().and_then(|clone| {
+            let opening = Opening { identity, setup, settling, run, provenance: None };
+            let (spool, disk) = spool::start(clone)?;
+            let book = Book::begin(spool, &opening)?;
+            disk.settle()?;
+            Ok((book, disk))
+        });
+        let (book, disk) = match begun {
+            Ok(begun) => begun,
+            Err(error) => {
+                place.remove();
+                return Err(error);
+            }
+        };
+        let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+        let epoch = u64::try_from(epoch).unwrap_or(u64::MAX);
+        let now = Instant::now();
+        Ok(Self { place, book, disk, file, epoch, started: now, flushed: now, newest: epoch })
+    }
+
+    /// The current path of the file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.place.path()
+    }
+
+    /// Share of the queue that waits for the disk, 0 to 1.
+    #[must_use]
+    pub fn queued(&self) -> f64 {
+        self.disk.queued()
+    }
+
+    /// Appends one packet as received.
+    ///
+    /// # Errors
+    /// If the disk is full or gone.
+    pub fn packet(&mut self, raw: &[u8]) -> io::Result<()> {
+        let age = u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        self.newest = self.epoch.saturating_add(age);
+        self.book.packet(self.newest, raw)?;
+        self.flush_if_due()
+    }
+
+    /// Writes what the newest packet means into the channels of log and telemetry. `tally` has
+    /// counted the packet.
+    ///
+    /// # Errors
+    /// If the disk is full or gone.
+    pub fn heard(
+        &mut self,
+        content: &Result<DeviceMessage<'_>, PacketError>,
+        tally: &Tally,
+    ) -> io::Result<()> {
+        self.book.heard(self.newest, content, tally)
+    }
+
+    /// Hands the received packets to the disk's queue, unless the last flush is recent.
+    ///
+    /// # Errors
+    /// As [`packet`](Self::packet).
+    pub fn flush_if_due(&mut self) -> io::Result<()> {
+        if self.flushed.elapsed() < FLUSH_EVERY {
+            return Ok(());
+        }
+        self.flushed = Instant::now();
+        self.book.flush()
+    }
+
+    /// Writes the account of the run and syncs the file to the disk. The recording of a whole run
+    /// then replaces the file that it should replace. Returns the file's path.
+    ///
+    /// # Errors
+    /// The file's path, and why the file could not be finished.
+    pub fn finish(self, account: &RunAccount) -> Result<PathBuf, (PathBuf, io::Error)> {
+        let Self { mut place, book, disk, file, .. } = self;
+        let written = book.end(Some(account)).and_then(|()| disk.end());
+        let settled = written.and_then(|()| place.settle(&file, account.missing.is_none()));
+        let path = place.path().to_owned();
+        settled.map(|()| path.clone()).map_err(|error| (path, error))
+    }
+
+    /// Removes the file, because nothing was recorded.
+    pub fn discard(self) {
+        let Self { place, book, disk, .. } = self;
+        drop((book, disk));
+        place.remove();
+    }
+}
