@@ -1,42 +1,13 @@
 //! Buffers on a device, and what every engine does with them.
 
-use crate::Gpu;
-use crate::agreement::Agree;
+use crate::error::GpuError;
 use crate::limits::DeviceLimits;
-use crate::network::Convolve;
-use crate::pursuit::Pursue;
-#[cfg(feature = "source")]
-use crate::source::SourceRuntime;
 use cubecl::bytes::Bytes;
-use cubecl::cuda::CudaRuntime;
 use cubecl::prelude::*;
 use cubecl::reader::read_sync;
 use cubecl::server::Handle;
-#[cfg(feature = "wgpu")]
-use cubecl::wgpu::WgpuRuntime;
 use half::f16;
 use std::fmt;
-use std::sync::Arc;
-use thiserror::Error;
-
-/// Why a device cannot compute. `Display` is one line.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum GpuError {
-    /// The problem exceeds a limit of the device.
-    #[error("the GPU has {limit} {what}, this problem needs {needed}")]
-    TooLarge {
-        /// What the device has too little of, with its unit.
-        what: &'static str,
-        /// How much the problem needs.
-        needed: usize,
-        /// How much the device has.
-        limit: usize,
-    },
-    /// The device or its driver failed.
-    #[error("the GPU failed: {0}")]
-    Failed(String),
-}
 
 /// A buffer of four-byte numbers on a device.
 #[derive(Clone, Debug)]
@@ -102,24 +73,6 @@ pub trait Engine: Send + Sync {
     /// # Errors
     /// [`GpuError::Failed`] if the device, its driver, or an earlier launch failed.
     fn read(&self, buffers: &[&Buffer]) -> Result<Vec<Numbers>, GpuError>;
-}
-
-/// Every kernel of this crate.
-pub trait Kernels: Pursue + Convolve + Agree {}
-
-impl<E: Pursue + Convolve + Agree> Kernels for E {}
-
-/// The engine of a device. CubeCL has one client for each device, so buffers of one engine can be
-/// used with every other engine of the same device.
-#[must_use]
-pub fn open(gpu: &Gpu) -> Arc<dyn Kernels> {
-    match gpu {
-        Gpu::Cuda(found) => Arc::new(CudaRuntime::client(&found.device)),
-        #[cfg(feature = "wgpu")]
-        Gpu::Wgpu(found) => Arc::new(WgpuRuntime::client(&found.device)),
-        #[cfg(feature = "source")]
-        Gpu::Source(found) => Arc::new(SourceRuntime::client(&found.device)),
-    }
 }
 
 /// A buffer with an even number of numbers in `f16`, two in each of its four-byte numbers.

@@ -4,7 +4,7 @@
 //! limit. Software Vulkan ends an invocation's loops after some 65 535 rounds without an error, so
 //! the rounds of all loops are counted before a launch.
 
-use crate::GpuError;
+use crate::error::GpuError;
 
 /// Largest number of rounds of all loops of one invocation, below the limit of software Vulkan.
 pub const ROUNDS: usize = 60_000;

@@ -5,7 +5,7 @@
 
 use crate::cache::{self, Compiled};
 #[cfg(feature = "source")]
-use crate::source::Card;
+use crate::card::Card;
 use cubecl::cuda::{CudaDevice, install::cuda_path};
 #[cfg(feature = "wgpu")]
 use cubecl::wgpu::WgpuDevice;
@@ -101,6 +101,13 @@ impl Gpu {
             #[cfg(feature = "source")]
             Self::Source(_) => true,
         }
+    }
+}
+
+#[cfg(feature = "source")]
+impl From<Card> for Gpu {
+    fn from(card: Card) -> Self {
+        Self::Source(Found { device: card, name: card.to_string(), software: true })
     }
 }
 

@@ -11,7 +11,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use nalgebra::DMatrix;
-use nirspi_gpu::source::{Card, written};
+use nirspi_gpu::card::Card;
+use nirspi_gpu::source::written;
 use nirspi_nets::consistency::MeasuredRows;
 use nirspi_nets::device::{Arithmetic, Device};
 use nirspi_nets::enhance::{DeviceEnhancer, Options};

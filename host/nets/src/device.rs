@@ -81,7 +81,7 @@ impl Device {
     /// A device that writes the CUDA source of its kernels, and gives zeros for results.
     #[cfg(feature = "source")]
     #[must_use]
-    pub fn source(card: nirspi_gpu::source::Card) -> Self {
+    pub fn source(card: nirspi_gpu::card::Card) -> Self {
         Self::on(card.into())
     }
 

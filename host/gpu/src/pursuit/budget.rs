@@ -2,7 +2,7 @@
 
 use super::layout::{Shape, TOGETHER};
 use super::referee::STEPS;
-use crate::GpuError;
+use crate::error::GpuError;
 use crate::limits::{BUFFER_BYTES, DeviceLimits, GROUPS, ROUNDS, check};
 
 /// Largest number of buffers that a kernel here uses.

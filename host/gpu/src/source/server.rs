@@ -39,7 +39,8 @@ use cubecl_runtime::storage::{ComputeStorage, ManagedResource, StorageHandle, St
 use cubecl_runtime::validation::{validate_cube_dim, validate_units};
 use cudarc::driver::sys::CUDA_VERSION;
 
-use super::{Card, Refused, Source};
+use super::{Refused, Source};
+use crate::card::Card;
 
 /// Alignment of buffers in bytes.
 const ALIGNMENT: usize = 512;
