@@ -101,6 +101,18 @@ pub fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Measurement
     }
 }
 
+impl Measurements {
+    /// Measurements from raw readings in time order, each pattern followed by its complement:
+    /// `y = [+, -, +, -, ...]`, `2 * rows.len()` readings. A constant dark level cancels in each
+    /// difference. As [`read`] of [`Form::Pairs`].
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<Reading, MeasurementError> {
+        read(rows, y, Form::Pairs.into())
+    }
+}
+
 /// Fewest readings of which it says something that all are equal.
 const FEWEST_EQUAL: usize = 8;
 

@@ -8,7 +8,6 @@ mod shorter_sweep;
 
 pub use shorter_sweep::ShorterSweep;
 
-use crate::law::{self, Form, Reading};
 use crate::{Order, Rows, RowsError, Side, order};
 use thiserror::Error;
 
@@ -79,16 +78,6 @@ impl Measurements {
         expect_length("d", d.len(), rows.len())?;
         expect_finite("d", d)?;
         Ok(Self { rows: rows.clone(), values: d.to_vec(), noise: None })
-    }
-
-    /// Measurements from raw readings in time order, each pattern followed by its complement:
-    /// `y = [+, -, +, -, ...]`, `2 * rows.len()` readings. A constant dark level cancels in each
-    /// difference. As [`law::read`] of [`Form::Pairs`].
-    ///
-    /// # Errors
-    /// As [`law::read`].
-    pub fn from_pairs(rows: &Rows, y: &[f64]) -> Result<Reading, MeasurementError> {
-        law::read(rows, y, Form::Pairs.into())
     }
 
     /// Measurements from readings of the positive patterns alone (light where `H` is +1):
