@@ -5,7 +5,8 @@ use crate::error::{EvalError, Result};
 use image::RgbImage;
 use nirspi::picture::{Axis, Chart, Line, below};
 use nirspi_optics::CameraModel;
-use nirspi_optics::pixel::{Instrument, PixelBudget, PixelError};
+use nirspi_optics::camera::Instrument;
+use nirspi_optics::pixel::{PixelBudget, PixelError};
 use nirspi_optics::rain::blur::DEEPEST_SINGLE;
 use nirspi_optics::rain::{Drops, PaperRain, Weather};
 use nirspi_optics::range::{

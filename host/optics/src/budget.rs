@@ -25,7 +25,7 @@ use thiserror::Error;
 
 use crate::daylight::DaylightError;
 use crate::lamp::LightSource;
-use crate::{CameraModel, LEDS, Projector, ProjectorError};
+use crate::{LEDS, Projector, ProjectorError};
 
 /// Planck constant in J s (SI, exact).
 const PLANCK_J_S: f64 = 6.626_070_15e-34;
@@ -55,8 +55,8 @@ pub enum BudgetError {
     Daylight(#[from] DaylightError),
 }
 
-/// The settings of the photon budget: a part of a [`CameraModel`]. The default is the paper's
-/// camera.
+/// The settings of the photon budget: a part of a [`CameraModel`](crate::CameraModel). The default
+/// is the paper's camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BudgetSettings {
     /// Optical power of one lit LED, in mW.
@@ -87,12 +87,6 @@ pub struct BudgetSettings {
     pub ambient_klx: f64,
     /// Width of the collector's band-pass filter around the wavelength, in nm.
     pub filter_width_nm: f64,
-}
-
-impl Default for BudgetSettings {
-    fn default() -> Self {
-        CameraModel::paper().budget_settings()
-    }
 }
 
 /// Energy of a photon, in J.

@@ -32,8 +32,8 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::Budget;
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
-use crate::{Budget, CameraModel};
 
 /// The steps of the switchable amplifier gain, in electrons per ADC count: two steps per octave.
 pub const GAINS_ELECTRONS_PER_COUNT: [f64; 32] = gains();
@@ -106,12 +106,6 @@ pub struct ChainSettings {
     pub adc_offset_counts: u16,
     /// ADC pipeline: clocks from the end of a sample to its code, 0 to 63.
     pub adc_latency_clocks: u8,
-}
-
-impl Default for ChainSettings {
-    fn default() -> Self {
-        CameraModel::paper().chain_settings()
-    }
 }
 
 /// Amplifier noise in electrons rms per sample, from its input current noise density. A single pole

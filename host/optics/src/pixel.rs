@@ -15,9 +15,9 @@
 //! samples ([`crate::chain`]).
 
 use crate::budget::BudgetError;
-use crate::camera::Readout;
+use crate::camera::{Instrument, Readout};
 use crate::rain::{RainError, Weather};
-use crate::{Budget, BudgetSettings, CameraModel, ChainSettings, LEDS, Projector};
+use crate::{Budget, ChainSettings, LEDS};
 use std::f64::consts::PI;
 use thiserror::Error;
 
@@ -41,28 +41,6 @@ pub enum PixelError {
         /// The allowed values.
         expected: &'static str,
     },
-}
-
-/// The whole instrument for a budget: [`CameraModel::instrument`]. The default is the paper's
-/// camera.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Instrument {
-    /// Light.
-    pub budget: BudgetSettings,
-    /// Lens and array.
-    pub projector: Projector,
-    /// Amplifier and ADC.
-    pub chain: ChainSettings,
-    /// Which samples of a pattern are used.
-    pub readout: Readout,
-    /// Distance between projector and collector, in mm.
-    pub baseline_mm: f64,
-}
-
-impl Default for Instrument {
-    fn default() -> Self {
-        CameraModel::paper().instrument()
-    }
 }
 
 /// Losses of light and sources of noise on the path to one pixel. Electrons are per ADC sample

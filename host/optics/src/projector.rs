@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use thiserror::Error;
 
-use crate::{CameraModel, LEDS, SIDE, Scene};
+use crate::{LEDS, SIDE, Scene};
 
 /// Grid points per LED pitch on which spots are integrated.
 const SAMPLES_PER_PITCH: usize = 8;
@@ -90,12 +90,6 @@ pub struct Projector {
     /// Share of the light lost at the corners of the field. The loss grows with the square of the
     /// distance from the centre.
     pub corner_vignetting: f64,
-}
-
-impl Default for Projector {
-    fn default() -> Self {
-        CameraModel::paper().projector()
-    }
 }
 
 impl Projector {

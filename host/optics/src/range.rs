@@ -13,7 +13,8 @@
 //! are computed in the listing and never used. `beta` is a share of an exposure, used as a
 //! coefficient per metre.
 
-use crate::pixel::{Instrument, PixelBudget, PixelError};
+use crate::camera::Instrument;
+use crate::pixel::{PixelBudget, PixelError};
 use crate::rain::Weather;
 use crate::rain::fall::beta;
 

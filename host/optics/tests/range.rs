@@ -3,7 +3,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::pixel::{Instrument, PixelBudget};
+use nirspi_optics::camera::Instrument;
+use nirspi_optics::pixel::PixelBudget;
 use nirspi_optics::rain::{Drops, Weather};
 use nirspi_optics::range::{
     FARTHEST_MM, Floor, Wanted, as_printed_mm, exposure_needed_us, extinction_needed_per_m,

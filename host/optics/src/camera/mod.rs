@@ -12,6 +12,7 @@ mod file;
 mod views;
 
 pub use file::CameraModelError;
+pub use views::Instrument;
 
 use crate::Projector;
 use crate::lamp::LightSource;

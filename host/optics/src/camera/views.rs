@@ -1,11 +1,11 @@
-//! The settings of each stage of the light's path, from the camera description.
+//! The settings of each stage of the light's path, from the camera description. The defaults are
+//! those of the paper's camera: the stages themselves know no camera.
 
-use super::CameraModel;
+use super::{CameraModel, Readout};
 use crate::budget::photon_j;
 use crate::chain::{adc_noise_counts, amplifier_noise_electrons};
 use crate::depth::DepthGeometry;
 use crate::instrument::SAMPLE_NS;
-use crate::pixel::Instrument;
 use crate::{BudgetSettings, ChainSettings, LEDS, Projector, SIDE};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -17,6 +17,22 @@ pub(crate) const ELECTRON_C: f64 = 1.602_176_634e-19;
 
 /// Four times Boltzmann's constant (SI, exact) at 300 K, in J.
 const FOUR_KT_J: f64 = 4.0 * 1.380_649e-23 * 300.0;
+
+/// The whole instrument for a budget: [`CameraModel::instrument`]. The default is the paper's
+/// camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instrument {
+    /// Light.
+    pub budget: BudgetSettings,
+    /// Lens and array.
+    pub projector: Projector,
+    /// Amplifier and ADC.
+    pub chain: ChainSettings,
+    /// Which samples of a pattern are used.
+    pub readout: Readout,
+    /// Distance between projector and collector, in mm.
+    pub baseline_mm: f64,
+}
 
 impl CameraModel {
     /// The lens before the array.
@@ -138,5 +154,29 @@ impl CameraModel {
             if lit { (power * pointing * vignetting) as f32 } else { 0.0 }
         };
         (0..LEDS).map(gain).collect()
+    }
+}
+
+impl Default for Projector {
+    fn default() -> Self {
+        CameraModel::paper().projector()
+    }
+}
+
+impl Default for BudgetSettings {
+    fn default() -> Self {
+        CameraModel::paper().budget_settings()
+    }
+}
+
+impl Default for ChainSettings {
+    fn default() -> Self {
+        CameraModel::paper().chain_settings()
+    }
+}
+
+impl Default for Instrument {
+    fn default() -> Self {
+        CameraModel::paper().instrument()
     }
 }
