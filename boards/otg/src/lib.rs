@@ -30,6 +30,8 @@ mod dma;
 mod repair;
 #[cfg(feature = "simulated")]
 pub mod simulated;
+#[cfg(feature = "simulated")]
+pub mod testing;
 
 use otg_v1::{Otg, regs, vals};
 

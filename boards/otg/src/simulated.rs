@@ -7,9 +7,6 @@ use std::rc::Rc;
 #[cfg(feature = "dma")]
 use std::vec::Vec;
 
-use crate::State;
-use crate::otg_v1::Otg;
-
 /// Registers that behave as those of the OTG core.
 pub trait Core {
     /// The value that a read of the register at this offset gives. The read may change the core, as a FIFO does.
@@ -109,18 +106,12 @@ std::thread_local! {
     static AS_RELEASED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Makes this core the one of the thread. With `as_released`, the driver runs without the fork's repairs.
-pub fn install(core: Rc<RefCell<dyn Core>>, as_released: bool) -> Otg {
+/// Makes this core the one of the thread, and returns the address of its registers. With `as_released`, the driver runs
+/// without the fork's repairs.
+pub(crate) fn place(core: Rc<RefCell<dyn Core>>, as_released: bool) -> *mut u8 {
     CORE.with(|place| *place.borrow_mut() = Some(core));
     AS_RELEASED.with(|place| place.set(as_released));
-    // SAFETY: with this feature the registers are addresses that are never accessed.
-    unsafe { Otg::from_ptr(SPACE.as_ptr().cast_mut().cast()) }
-}
-
-/// The core's interrupt, for a core that has one pending.
-pub fn interrupt<const EP_COUNT: usize>(r: Otg, state: &State<EP_COUNT>) {
-    // SAFETY: called between two polls of a test, where no other code of the driver runs.
-    unsafe { crate::on_interrupt(r, state, EP_COUNT) }
+    SPACE.as_ptr().cast_mut()
 }
 
 pub(crate) fn as_released() -> bool {

@@ -11,7 +11,7 @@ use embassy_usb::driver::{
 };
 use embassy_usb_synopsys_otg::otg_v1::Otg;
 use embassy_usb_synopsys_otg::{
-    Bus, Config, ControlPipe, Driver, Endpoint, In, OtgInstance, Out, PhyType, State, simulated,
+    Bus, Config, ControlPipe, Driver, Endpoint, In, OtgInstance, Out, PhyType, State, testing,
 };
 use std::boxed::Box;
 use std::cell::RefCell;
@@ -39,7 +39,7 @@ fn driver(
     buffer: &'static mut [u8],
 ) -> (Rc<RefCell<OtgCore>>, Otg, &'static State<ENDPOINTS>, Driver<'static, ENDPOINTS>) {
     let core: Rc<RefCell<OtgCore>> = Rc::default();
-    let registers = simulated::install(Rc::clone(&core) as Rc<_>, false);
+    let registers = testing::install(Rc::clone(&core) as Rc<_>, false);
     let state: &'static State<ENDPOINTS> = Box::leak(Box::new(State::new()));
     let instance = OtgInstance {
         regs: registers,
@@ -92,7 +92,7 @@ impl Lab {
             if !self.core.borrow_mut().interrupt() {
                 return;
             }
-            simulated::interrupt(self.registers, self.state);
+            testing::interrupt(self.registers, self.state);
         }
         panic!("the interrupt does not end");
     }
@@ -170,7 +170,7 @@ fn a_write_of_many_packets_ends_when_the_host_has_the_last() {
                 toggle ^= 1;
                 got.extend(bytes);
                 while core.borrow_mut().interrupt() {
-                    simulated::interrupt(*registers, state);
+                    testing::interrupt(*registers, state);
                 }
             }
             assert_eq!(poll_once(write.as_mut()), Poll::Ready(Ok(())));
@@ -289,7 +289,7 @@ fn the_control_endpoint_carries_requests_with_data_each_way_and_without() {
             assert!(matches!(&fetched, Answer::Data(bytes, _) if bytes == &[1, 2, 3, 4, 5]));
             assert!(matches!(core.borrow_mut().send(NEW, 0, &[], 1), Answer::Data(..)));
             while core.borrow_mut().interrupt() {
-                simulated::interrupt(*registers, state);
+                testing::interrupt(*registers, state);
             }
             assert_eq!(poll_once(answer.as_mut()), Poll::Ready(Ok(())));
         }
@@ -344,7 +344,7 @@ fn a_request_comes_through_whatever_the_host_has_given_up() {
             }
             assert!(matches!(lab.core.borrow_mut().setup(NEW, NO_DATA), Answer::Data(..)));
             while lab.core.borrow_mut().interrupt() {
-                simulated::interrupt(lab.registers, lab.state);
+                testing::interrupt(lab.registers, lab.state);
             }
             assert_eq!(poll_once(answer.as_mut()), Poll::Ready(Err(EndpointError::Disabled)));
         }

@@ -5,7 +5,7 @@ use super::SERIAL;
 use super::otg_core::{Answer, ENDPOINTS, OtgCore, Speed};
 use crate::{Memory, OutBuffer, Presence, device, serve};
 use embassy_usb_synopsys_otg::otg_v1::Otg;
-use embassy_usb_synopsys_otg::{Config, Driver, OtgInstance, PhyType, State, simulated};
+use embassy_usb_synopsys_otg::{Config, Driver, OtgInstance, PhyType, State, testing};
 use nirspi_app::bench::{self, FakeBoard, FakeFpga, Pins, configuration, packet};
 use nirspi_app::link::{Link, Packet};
 use nirspi_app::{DepthMailbox, board_info, run};
@@ -108,7 +108,7 @@ impl World {
 
     fn started(pins: Rc<Pins>, crash: Option<Crash>, chip: Chip) -> Self {
         let core: Rc<RefCell<OtgCore>> = Rc::default();
-        let registers = simulated::install(Rc::clone(&core) as Rc<_>, chip == Chip::Released);
+        let registers = testing::install(Rc::clone(&core) as Rc<_>, chip == Chip::Released);
         let state: &'static State<ENDPOINTS> = Box::leak(Box::new(State::new()));
         let instance = OtgInstance {
             regs: registers,
@@ -162,7 +162,7 @@ impl World {
             if !self.core.borrow_mut().interrupt() {
                 break;
             }
-            simulated::interrupt(self.registers, self.state);
+            testing::interrupt(self.registers, self.state);
         }
         for task in &mut self.tasks {
             if task.woken.0.swap(false, Ordering::Relaxed) {
