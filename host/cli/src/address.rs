@@ -3,7 +3,7 @@
 use super::camera::SceneArgs;
 use super::print;
 use anyhow::{Context, Result};
-pub use nirspi::address::CameraAddress;
+use nirspi::address::CameraAddress;
 use nirspi::link::Link;
 use nirspi::session::Session;
 use nirspi_virtual::MemoryLink;

@@ -1,9 +1,9 @@
 //! Arguments for the camera, for the scene of a virtual camera, and for the measurement.
 
-use super::address::CameraAddress;
 use super::{Usage, print};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use nirspi::address::CameraAddress;
 use nirspi::devices;
 use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::files::order_table::read_order_table;

@@ -1,19 +1,17 @@
 //! `nirspi enhance`: fusion and deblurring, from the camera's 32 x 32 to the 64 x 64 output.
 
-use super::deblur::{Sharpening, in_steps};
-use super::networks::{ImageArgs, checked};
-use super::print;
+use super::networks::{ImageArgs, checked, say};
 use super::progress::Progress;
 use super::provenance::made;
 use super::report::{stages, words};
+use super::sharpening::{Sharpening, in_steps};
 use super::upscale::DepthArgs;
 use anyhow::Result;
-use nirspi::imaging::{Deblurring, StackReport};
+use nirspi::imaging::Deblurring;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::interval::Readings;
 use nirspi_nets::{Images, fusion};
 use nirspi_recon::reconstruct::Method;
-use nirspi_recon::words::count_of;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -109,18 +107,4 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);
     let report = args.images.report(&input, &networks, Some(deblurring), shown, times);
     args.images.report.print(&report, &provenance, say)
-}
-
-/// The report in two lines.
-pub fn say(report: &StackReport) -> Result<()> {
-    if let Some(deblurring) = &report.deblurring {
-        print::line(deblurring.line())?;
-    }
-    print::line(format_args!(
-        "{} on {}, in {}; to look at: {}",
-        count_of(report.images, "image"),
-        report.device,
-        report.output.display(),
-        report.pictures
-    ))
 }

@@ -1,11 +1,12 @@
 //! `nirspi gateware`: loads a bitstream into a camera's FPGA.
 
-use super::address::{self, CameraAddress};
+use super::address;
 use super::camera::{ModelArgs, SceneArgs};
 use super::print;
 use super::progress::Progress;
 use super::report::ReportArgs;
 use anyhow::{Context, Result};
+use nirspi::address::CameraAddress;
 use nirspi::session::Session;
 use nirspi::versions::of_register;
 use nirspi_update::gateware;

@@ -42,6 +42,7 @@ mod serve;
 mod serve_virtual;
 mod settings;
 mod setup;
+mod sharpening;
 mod signals;
 mod source;
 mod update;

@@ -124,3 +124,17 @@ impl ImageArgs {
 pub fn checked<const SIDE: usize>(stack: &ImageStack) -> Result<Images<'_, SIDE>> {
     Images::new(stack.values(SIDE)?).with_context(|| stack.path().display().to_string())
 }
+
+/// Prints the report of [`ImageArgs::report`] in two lines.
+pub fn say(report: &StackReport) -> Result<()> {
+    if let Some(deblurring) = &report.deblurring {
+        print::line(deblurring.line())?;
+    }
+    print::line(format_args!(
+        "{} on {}, in {}; to look at: {}",
+        count_of(report.images, "image"),
+        report.device,
+        report.output.display(),
+        report.pictures
+    ))
+}

@@ -1,10 +1,10 @@
 //! `nirspi update`: brings a camera to the versions of a release.
 
-use super::address::CameraAddress;
 use super::progress::Progress;
 use super::report::ReportArgs;
 use super::{flash, gateware, print};
 use anyhow::{Context, Result};
+use nirspi::address::CameraAddress;
 use nirspi_update::{Plan, Release, await_firmware, load_gateware};
 use std::path::PathBuf;
 use std::process::ExitCode;
