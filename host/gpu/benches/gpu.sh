@@ -119,7 +119,7 @@ correctness() {
     local failed=0
     # The same tests as on software Vulkan.
     NIRSPI_TEST_BACKEND=cuda step tests-recon 120 "$work/tests-recon" omp:: --nocapture || failed=1
-    step tests-nets 200 "$work/tests-nets" gpu:: network:: enhance::device --nocapture || failed=1
+    step tests-nets 200 "$work/tests-nets" gpu:: networks:: enhance::device --nocapture || failed=1
     if grep -h '^skipped: .*CUDA' "$out/tests-recon.txt" "$out/tests-nets.txt" | sort | uniq -c | grep .; then
         echo "tests on CUDA: skipped" | tee -a "$out/summary.txt"
         failed=1

@@ -14,10 +14,10 @@ use nalgebra::DMatrix;
 use nirspi_gpu::card::Card;
 use nirspi_gpu::source::written;
 use nirspi_nets::consistency::MeasuredRows;
-use nirspi_nets::device::{Arithmetic, Device};
 use nirspi_nets::enhance::{DeviceEnhancer, Options};
 use nirspi_nets::fusion::{self, DepthMaps};
 use nirspi_nets::weights::Weights;
+use nirspi_nets::{Arithmetic, Device};
 use nirspi_recon::omp::gpu::{self, DeviceDictionary, DeviceImages, path_over};
 use nirspi_recon::omp::{DenseDictionary, Limits};
 

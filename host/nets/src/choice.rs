@@ -16,7 +16,7 @@ use crate::device::Device;
 #[cfg(feature = "gpu")]
 use crate::enhance::{DeviceEnhancer, DeviceEnhancerError};
 use crate::enhance::{Enhancer, Sharpener};
-use crate::estimate::BlurEstimator;
+use crate::estimator::BlurEstimator;
 use crate::fusion::Fusion;
 use crate::weights::{MODEL, VERSION, Weights, WeightsError};
 

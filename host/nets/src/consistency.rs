@@ -34,7 +34,7 @@ use std::f32::consts::PI;
 use std::sync::LazyLock;
 
 /// Side of the sharp image.
-pub const SIDE: usize = crate::deblur::SIDE;
+pub const SIDE: usize = crate::grid::FINE;
 
 /// Factor on the expected radius of the ball.
 const TAU: f32 = 1.1;

@@ -17,6 +17,7 @@ use std::num::NonZeroU32;
 
 use crate::device::Device;
 use crate::estimate::Estimate;
+use crate::grid::{self, AREA};
 use crate::network::RunUNet;
 use crate::weights::{Weights, WeightsError};
 
@@ -27,10 +28,8 @@ pub use model::{Method, MethodError, Model};
 use sharpen::Residual;
 pub use sharpen::{Blurred, Sharpen, SharpenError};
 
-/// Side of the images: twice that of the readings (paper, 2.C).
-pub const SIDE: usize = 2 * crate::fusion::SIDE;
-
-pub(crate) const AREA: usize = SIDE * SIDE;
+/// Side of the images.
+pub const SIDE: usize = grid::FINE;
 
 /// A batch of images to deblur.
 #[derive(Debug, Clone, Copy)]

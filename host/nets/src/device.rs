@@ -5,15 +5,14 @@
 //! (`tests::a_gpu_that_is_missing_is_one_plain_line`). [`Backend::Auto`] takes a real GPU if there
 //! is one, and never a software device (`tests::the_cpu_and_auto_are_always_there`).
 
-mod arithmetic;
+mod networks;
 
-pub use arithmetic::{Arithmetic, Note, ParseArithmeticError};
 pub use nirspi_recon::backend::{Backend, ParseBackendError};
 
-pub(crate) use arithmetic::Notes;
-
+use crate::arithmetic::Arithmetic;
 #[cfg(feature = "gpu")]
 use crate::gpu::Multiplier;
+use crate::note::{Note, Notes};
 #[cfg(feature = "gpu")]
 use nirspi_gpu::network::Product;
 #[cfg(feature = "gpu")]

@@ -7,23 +7,23 @@
 
 #[cfg(feature = "gpu")]
 mod device;
-mod known;
 
 use std::num::NonZeroU32;
 
 use thiserror::Error;
 
 use crate::consistency::{MeasuredRows, MeasuredRowsError};
-use crate::deblur::{self, AREA, DataConstraint, Deblurrer, Job, Sharpen, SharpenError};
-use crate::estimate::{BlurEstimator, Estimate};
+use crate::deblur::{self, DataConstraint, Deblurrer, Job, Sharpen, SharpenError};
+use crate::estimate::{Estimate, KnownEstimate};
+use crate::estimator::BlurEstimator;
 use crate::fusion::{DepthMaps, Fusion};
 use crate::gate;
+use crate::grid::AREA;
 use crate::images::Images;
 use crate::spread::{Moments, doubled, measured_again};
 
 #[cfg(feature = "gpu")]
 pub use device::{DeviceEnhancer, DeviceEnhancerError};
-pub use known::{Known, KnownEstimate};
 
 /// Options for deblurring or enhancing a stack.
 #[derive(Debug, Clone)]

@@ -1,12 +1,12 @@
-//! Estimates blur and noise of an image from the image itself.
+//! Blur and noise of an image: as estimated, as the caller knows them, and as the networks take
+//! them.
 
-use crate::device::Device;
-use crate::images::Images;
-use crate::network::{Conditions, RunEstimator};
-use crate::weights::{Weights, WeightsError};
+mod known;
 
-/// Side of the grid whose pixels are the unit of blur.
-const OUTPUT_SIDE: usize = crate::deblur::SIDE;
+use crate::grid::FINE;
+use crate::schema::Conditions;
+
+pub use known::{Known, KnownEstimate};
 
 /// The blur in pixels that is 1 on the networks' scale.
 pub(crate) const SIGMA_SCALE_PX: f32 = 4.0;
@@ -30,7 +30,7 @@ impl Estimate {
     /// The estimate from the estimator's two outputs for an image of `side` x `side`. The outputs
     /// count blur in pixels of the image's own grid.
     pub(crate) fn of_outputs([sigma, noise]: [f32; 2], side: usize) -> Self {
-        let px = SIGMA_SCALE_PX * (OUTPUT_SIDE / side) as f32;
+        let px = SIGMA_SCALE_PX * (FINE / side) as f32;
         Self { sigma_px: px * sigma, noise: noise / NOISE_SCALE }
     }
 
@@ -39,32 +39,5 @@ impl Estimate {
         let s = (self.sigma_px / SIGMA_SCALE_PX).clamp(0.0, CONDITION_MAX);
         let n = (self.noise * NOISE_SCALE).clamp(0.0, CONDITION_MAX);
         [path[0], path[1], s, s * s, n, n * n]
-    }
-}
-
-/// The estimator.
-pub struct BlurEstimator {
-    network: Box<dyn RunEstimator>,
-    batch: usize,
-}
-
-impl BlurEstimator {
-    /// The network with these weights (model `estimator`).
-    ///
-    /// # Errors
-    /// [`WeightsError`] if the weights belong to another network.
-    pub fn new(device: &Device, weights: &Weights) -> Result<Self, WeightsError> {
-        weights.expect_model("estimator")?;
-        Ok(Self { network: device.estimator(weights)?, batch: device.batch() })
-    }
-
-    /// Blur and noise of each image of 32 x 32 or 64 x 64.
-    pub fn estimate<const SIDE: usize>(&self, images: Images<'_, SIDE>) -> Vec<Estimate> {
-        images
-            .values()
-            .chunks(self.batch * SIDE * SIDE)
-            .flat_map(|chunk| self.network.run(SIDE, chunk))
-            .map(|outputs| Estimate::of_outputs(outputs, SIDE))
-            .collect()
     }
 }

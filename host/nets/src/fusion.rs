@@ -17,7 +17,7 @@ use crate::network::RunFsrcnn;
 use crate::weights::{Weights, WeightsError};
 
 /// Side of the intensity image.
-pub const SIDE: usize = nirspi_recon::Side::INSTRUMENT.pixels();
+pub const SIDE: usize = crate::grid::COARSE;
 
 /// The depth in metres that is 1 on the network's scale; a greater depth is 1 too.
 const DEPTH_SCALE_M: f32 = 3.0;

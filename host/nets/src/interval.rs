@@ -25,12 +25,12 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::choice::Networks;
-use crate::deblur::{AREA, Method};
+use crate::deblur::Method;
 use crate::enhance::{Enhanced, Options};
 use crate::estimate::Estimate;
+use crate::grid::AREA;
 use crate::weights::{Weights, WeightsError};
 
-pub(crate) use table::rounded;
 pub use table::{FLOOR, LEVEL, LEVELS, Sample, Table, TableError, edges};
 
 /// A half-width from which the interval says no more than that the pixel is somewhere between dark

@@ -8,11 +8,16 @@
 //! A network runs only with complete weights: each tensor exists and has the one shape that fits
 //! its neighbours, all numbers are finite, and there are no other tensors
 //! (`tests::a_damaged_tensor_is_named_with_what_was_found_and_expected`). Every backend checks with
-//! this module first (`network::tests::every_device_refuses_the_same_weights_in_the_same_words`).
+//! this module first (`device::networks::tests::every_device_refuses_the_same_weights_in_the_same_words`).
 
-use crate::network::CONDITIONS;
 use crate::weights::{Weights, WeightsError};
 use nirspi_recon::reconstruct::prior::Seen;
+
+/// Number of conditions of the UNet: time (2), blur (2), noise (2).
+pub(crate) const CONDITIONS: usize = 6;
+
+/// The conditions of one image.
+pub(crate) type Conditions = [f32; CONDITIONS];
 
 /// The most levels of a UNet. Its images of 64 x 64 are halved before the first level and after
 /// each level except the last.

@@ -9,12 +9,13 @@
 //! (`tests::equal_images_blend_to_themselves`).
 
 use crate::blur::Blur;
-use crate::enhance::{EnhanceError, Enhanced, Enhancer, Known, Options};
+use crate::enhance::{EnhanceError, Enhanced, Enhancer, Options};
+use crate::estimate::Known;
 use crate::fusion::{self, DepthMaps};
 use crate::images::Images;
 
 /// Side of the images that are blended.
-const SIDE: usize = crate::deblur::SIDE;
+const SIDE: usize = crate::grid::FINE;
 
 /// Blurs that differ by less than this are one zone, in pixels of the 64 x 64 grid. The estimator
 /// of blur is no finer.

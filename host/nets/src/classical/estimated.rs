@@ -5,7 +5,7 @@ use crate::consistency::Consistency;
 use crate::{BlurEstimator, Enhanced, Images, KnownEstimate};
 
 /// The side of the images.
-const SIDE: usize = crate::deblur::SIDE;
+const SIDE: usize = crate::grid::FINE;
 
 /// Deblurs each image with its own blur and noise: the known ones, or else the estimated ones.
 /// Calls `done` after each image.

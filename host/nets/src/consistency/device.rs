@@ -10,9 +10,8 @@ use nirspi_gpu::{GpuError, Kernels};
 
 use super::{BISECTIONS, LEAST_LAMBDA, MOST_LOG_LAMBDA, NOISE_FLOOR, OF_IMAGE, OF_READINGS, TAU};
 use super::{MeasuredRows, krylov, measured};
-use crate::enhance::KnownEstimate;
-use crate::estimate::{NOISE_SCALE, SIGMA_SCALE_PX};
-use crate::fusion;
+use crate::estimate::{KnownEstimate, NOISE_SCALE, SIGMA_SCALE_PX};
+use crate::grid::COARSE;
 
 /// The agreement with readings of 32 x 32 that were made from these rows, for the estimator's
 /// outputs with what the caller knows, on a device with these limits. Images are moved only if it is
@@ -47,7 +46,7 @@ pub(crate) fn agreement(
     };
     let [least, most] = known.bounds();
     let told = Told {
-        sigma_scale: SIGMA_SCALE_PX * (super::SIDE / fusion::SIDE) as f32,
+        sigma_scale: SIGMA_SCALE_PX * (super::SIDE / COARSE) as f32,
         sigma: [least.sigma_px, most.sigma_px],
         noise_scale: 1.0 / NOISE_SCALE,
         noise: [least.noise, most.noise],

@@ -13,6 +13,7 @@ mod conv;
 pub(crate) mod estimator;
 mod fsrcnn;
 mod layers;
+mod on_cpu;
 mod pixels;
 mod planes;
 mod pointwise;
@@ -24,6 +25,7 @@ mod winograd;
 pub use classifier::Classifier;
 pub use estimator::Estimator;
 pub use fsrcnn::Fsrcnn;
+pub(crate) use on_cpu::OnCpu;
 pub use prior::Prior;
 pub use unet::UNet;
 

@@ -31,7 +31,7 @@ pub use stack::{DataError, Kind, Stack};
 pub use stream::{Purpose, stream};
 
 /// Side of a scene in pixels, which is that of the output grid (paper, 2.C).
-pub const SIDE_PX: usize = crate::deblur::SIDE;
+pub const SIDE_PX: usize = crate::grid::FINE;
 /// Number of pixels of a scene.
 pub const AREA_PX: usize = SIDE_PX * SIDE_PX;
 /// Number of classes of Chars74K: 0-9, A-Z, a-z.

@@ -107,7 +107,7 @@ mod tests {
     use super::*;
     use crate::consistency::MeasuredRows;
     use crate::estimate::Estimate;
-    use crate::network::Conditions;
+    use crate::schema::Conditions;
 
     /// A network that knows the sharp image: 0.75 everywhere.
     struct Oracle;

@@ -33,8 +33,8 @@ pub(super) fn run(
 mod tests {
     use super::*;
     use crate::consistency::MeasuredRows;
-    use crate::deblur::AREA;
     use crate::estimate::Estimate;
+    use crate::grid::AREA;
     use std::sync::Mutex;
 
     /// A network that gives the same correction at any time, and records its inputs.

@@ -4,7 +4,7 @@
 pub mod defocus;
 
 /// Side of the camera's reading, in pixels.
-pub const READING_PX: usize = crate::fusion::SIDE;
+pub const READING_PX: usize = crate::grid::COARSE;
 /// Number of zones along one edge of a depth map.
 pub const DEPTH_SIDE: usize = 8;
 

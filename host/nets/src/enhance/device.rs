@@ -5,6 +5,8 @@
 //! rounding of single precision
 //! (`tests::images_that_are_there_become_what_the_processor_makes_of_them`).
 
+mod chain;
+
 use std::ops::Range;
 
 use nirspi_gpu::GpuError;
@@ -18,8 +20,8 @@ use super::{Enhanced, Options, constraint_on};
 use crate::consistency::MeasuredRowsError;
 use crate::device::{Backend, Device};
 use crate::fusion::{self, DepthMaps, push_planes};
-use crate::network::{Guess, RunChain};
 use crate::weights::{Weights, WeightsError};
+use chain::{Chain, Guess};
 
 /// Number of batches that are under way at a time, each on a thread and a stream of its own: while
 /// the results of one are copied, another one is computed.
@@ -84,7 +86,7 @@ pub enum DeviceEnhancerError {
 /// memory for the kernel of the last step, agreement with the readings, that step runs on the host
 /// ([`Note::AgreementOnCpu`](crate::Note)).
 pub struct DeviceEnhancer {
-    chain: Box<dyn RunChain>,
+    chain: Chain,
     backend: Backend,
     /// The same device, for uploads.
     uploads: gpu::Device,
@@ -103,7 +105,8 @@ impl DeviceEnhancer {
         estimator: &Weights,
         bridge: &Weights,
     ) -> Result<Self, DeviceEnhancerError> {
-        let chain = device.chain(fsrcnn, estimator, bridge)?.ok_or(DeviceEnhancerError::NoGpu)?;
+        let engine = device.engine().ok_or(DeviceEnhancerError::NoGpu)?;
+        let chain = Chain::new(device, &engine, [fsrcnn, estimator, bridge])?;
         let backend = device.backend();
         let uploads = device.uploads().ok_or(DeviceEnhancerError::NoGpu)?;
         Ok(Self { chain, backend, uploads, batch: device.batch() })

@@ -3,6 +3,7 @@
 use super::*;
 use crate::deblur::{Method, Model};
 use crate::device::Device;
+use crate::estimate::Known;
 use crate::weights::Weights;
 
 const SIDE: usize = 32;

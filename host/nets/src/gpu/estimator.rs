@@ -48,13 +48,13 @@ impl Estimator {
     }
 
     /// Number of images of `side` x `side` that the network processes at once.
-    pub(super) fn at_once(&self, side: usize) -> usize {
+    pub(crate) fn at_once(&self, side: usize) -> usize {
         let widest = self.convs.iter().map(|layer| layer.geometry().outputs).max().unwrap_or(0);
         frames_at_once(widest * side * side, self.engine.limits().buffer_bytes, AT_ONCE)
     }
 
     /// The two outputs for each of `frames` images of `side` x `side`.
-    pub(super) fn forward(&self, (frames, side): (usize, usize), images: &Buffer) -> Buffer {
+    pub(crate) fn forward(&self, (frames, side): (usize, usize), images: &Buffer) -> Buffer {
         let on = self.engine.as_ref();
         // These layers have no slopes, so PReLU is ReLU.
         let relu = Finish { activation: Activation::Prelu, ..Finish::default() };

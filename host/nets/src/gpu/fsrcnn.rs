@@ -52,7 +52,7 @@ impl Fsrcnn {
     }
 
     /// Number of images of `side` x `side` that the network processes at once.
-    pub(super) fn at_once(&self, side: usize) -> usize {
+    pub(crate) fn at_once(&self, side: usize) -> usize {
         let widest = self.layers.iter().map(|layer| layer.geometry().outputs).max().unwrap_or(0);
         frames_at_once(
             widest.max(CHANNELS + 1) * side * side,
@@ -63,7 +63,7 @@ impl Fsrcnn {
 
     /// Enlarges `readings` (frames, side, side) to twice the side; `depth` is (frames, 2, side,
     /// side), if there is any.
-    pub(super) fn forward(
+    pub(crate) fn forward(
         &self,
         (frames, side): (usize, usize),
         readings: &Buffer,

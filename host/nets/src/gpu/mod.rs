@@ -2,7 +2,7 @@
 //!
 //! # Invariant
 //! A GPU gives the processor's results to within 1e-4
-//! (`network::tests::every_device_of_this_machine_gives_what_pytorch_gives`), and to within 5e-3 in
+//! (`device::networks::tests::every_device_of_this_machine_gives_what_pytorch_gives`), and to within 5e-3 in
 //! [`Arithmetic::F16`](crate::Arithmetic::F16)
 //! (`tests::products::the_unet_by_products_is_the_unet_in_both_precisions`).
 //!
@@ -12,11 +12,9 @@
 //! | `layer` | a convolution whose weights are on a device |
 //! | `multiplier` | tensor cores for the UNet |
 //! | `unet`, `fsrcnn`, `estimator` | the networks |
-//! | `chain` | the three networks one after another, for images that are already on the device |
 //!
 //! The kernels, and how they compute a convolution, are in [`nirspi_gpu::network`].
 
-mod chain;
 mod estimator;
 mod fsrcnn;
 mod layer;
@@ -29,7 +27,6 @@ mod tests;
 
 use nirspi_gpu::{Buffer, Kernels};
 
-pub(crate) use chain::Chain;
 pub(crate) use estimator::Estimator;
 pub(crate) use fsrcnn::Fsrcnn;
 pub(crate) use multiplier::Multiplier;

@@ -11,8 +11,9 @@ use nirspi_gpu::network::{LARGEST_F16, Layer, Product, Products};
 use nirspi_gpu::{Buffer, Kernels};
 
 use super::pack::{self, Order};
-use crate::device::{Arithmetic, Note, Notes};
+use crate::arithmetic::Arithmetic;
 use crate::filter::Filter;
+use crate::note::{Note, Notes};
 
 /// How convolutions multiply on a device with tensor cores.
 #[derive(Debug, Clone)]

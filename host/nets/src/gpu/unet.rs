@@ -10,12 +10,12 @@ use nirspi_gpu::{Buffer, GpuError, Kernels, Numbers};
 use super::layer::{self, Maker, checked};
 use super::multiplier::Multiplier;
 use super::pack::Order;
-use crate::deblur::SIDE;
-use crate::device::Note;
 use crate::filter::Filter;
-use crate::network::{CONDITIONS, Conditions, RunUNet};
+use crate::grid::FINE as SIDE;
+use crate::network::RunUNet;
+use crate::note::Note;
 use crate::random::Noise;
-use crate::schema::{self, UNetSizes};
+use crate::schema::{self, CONDITIONS, Conditions, UNetSizes};
 use crate::weights::{Weights, WeightsError};
 
 /// Largest number of images processed at once.
@@ -114,7 +114,7 @@ impl UNet {
     ///
     /// # Errors
     /// [`GpuError`] if the GPU or its driver fails while it computes.
-    pub(super) fn read_after<const N: usize>(
+    pub(crate) fn read_after<const N: usize>(
         &self,
         forward: impl Fn() -> [Buffer; N],
     ) -> Result<[Numbers; N], GpuError> {
@@ -165,7 +165,7 @@ impl UNet {
     }
 
     /// Number of images of `side` x `side` that the network processes at once.
-    pub(super) fn at_once(&self, side: usize) -> usize {
+    pub(crate) fn at_once(&self, side: usize) -> usize {
         let largest = (self.channels * (side / 2) * (side / 2)).max(2 * side * side);
         // About eight buffers of this size live at a time, and two batches are under way. A device
         // allows buffers of a fourth of its memory, so these sixteen fit all of it.
@@ -174,7 +174,7 @@ impl UNet {
 
     /// The network's output for `frames` images of `side` x `side`, given their conditions (frames,
     /// 6) and degraded images; `start` is added, if there is one.
-    pub(super) fn forward(
+    pub(crate) fn forward(
         &self,
         size: (usize, usize),
         current: &Buffer,

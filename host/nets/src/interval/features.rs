@@ -1,7 +1,7 @@
 //! What is known about a pixel of an enhanced image without its truth.
 
 use super::{Readings, Seen};
-use crate::deblur::{AREA, SIDE};
+use crate::grid::{AREA, FINE as SIDE};
 
 /// Number of features of a pixel.
 pub(super) const FEATURES: usize = 14;

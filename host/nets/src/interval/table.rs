@@ -13,7 +13,8 @@ use thiserror::Error;
 
 use super::features::{BUSYNESS, CONTRAST, FEATURES, NAMES, TERMS, features, terms};
 use super::{Readings, Seen};
-use crate::deblur::{AREA, SIDE};
+use crate::grid::{AREA, FINE as SIDE};
+use crate::rounding::rounded;
 
 /// The levels of the table: shares of pixels whose error is not larger than the half-width.
 pub const LEVELS: [f64; 7] = [0.5, 0.68, 0.8, 0.9, 0.95, 0.98, 0.99];
@@ -355,11 +356,6 @@ impl Table {
         let factors = self.factors.iter_mut().flatten().map(Vec::as_mut_slice);
         lists.into_iter().chain(factors).flatten().for_each(|value| *value = rounded(*value));
     }
-}
-
-/// A number rounded to five digits.
-pub(crate) fn rounded(value: f32) -> f32 {
-    format!("{value:.4e}").parse().unwrap_or(value)
 }
 
 /// Number of cells.

@@ -11,7 +11,7 @@ use crate::weights::{Weights, WeightsError};
 use rayon::prelude::*;
 
 /// Side of the judged images in pixels.
-pub const SIDE: usize = crate::deblur::SIDE;
+pub const SIDE: usize = crate::grid::FINE;
 
 /// The classifier, on the CPU.
 #[derive(Debug)]

@@ -9,9 +9,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::deblur::{AREA, SIDE};
-use crate::interval::rounded;
+use crate::grid::{AREA, FINE as SIDE};
 use crate::random::Noise;
+use crate::rounding::rounded;
 
 /// Number of hidden units.
 const HIDDEN: usize = 24;

@@ -76,10 +76,9 @@ fn where_the_agreement_does_not_fit_the_device_the_processor_makes_it_and_the_us
         let images = DeviceImages::upload(&omp, &readings, fusion::SIDE * fusion::SIDE).unwrap();
         let [fsrcnn, estimator, bridge] = &weights;
         let engine = device.engine().unwrap();
-        let mut chain =
-            crate::gpu::Chain::new(&device, &engine, [fsrcnn, estimator, bridge]).unwrap();
+        let mut chain = Chain::new(&device, &engine, [fsrcnn, estimator, bridge]).unwrap();
         chain.limits.shared_bytes = 16 << 10;
-        let small = DeviceEnhancer { chain: Box::new(chain), ..on(&device) };
+        let small = DeviceEnhancer { chain, ..on(&device) };
         let enhance = |by: &DeviceEnhancer| {
             by.enhance(&images, 1.0, None, &Options::default(), &mut |_| {}).unwrap()
         };

@@ -4,8 +4,8 @@ use nirspi_gpu::agreement::BROKEN;
 
 use super::*;
 use crate::consistency::{Consistency, MeasuredRows, agreement};
-use crate::deblur::AREA;
 use crate::fusion;
+use crate::grid::AREA;
 use crate::random::Noise;
 use crate::{Estimate, KnownEstimate};
 

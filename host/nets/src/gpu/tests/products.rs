@@ -6,9 +6,10 @@ use nirspi_gpu::network::tiles::Columns;
 use nirspi_gpu::network::{Layer, Product, Products, Way, is_f16};
 
 use super::*;
-use crate::device::{Arithmetic, Note, Notes};
+use crate::arithmetic::Arithmetic;
 use crate::gpu::multiplier::Multiplier;
 use crate::gpu::{UNet, pack};
+use crate::note::{Note, Notes};
 
 /// The tensor cores of a device, or else their imitation.
 fn product_of(engine: &dyn Kernels) -> Option<Product> {

@@ -1,6 +1,6 @@
 //! The caller's knowledge of blur and noise, and how it is combined with the estimates.
 
-use crate::estimate::Estimate;
+use super::Estimate;
 
 /// What the caller knows about a number that the estimator also estimates.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

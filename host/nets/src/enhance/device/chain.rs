@@ -2,38 +2,60 @@
 //! for images that are already on the device.
 //!
 //! No data comes to the host between the images and the results; one read at the end fetches all
-//! results (`enhance::device::tests::images_that_are_there_become_what_the_processor_makes_of_them`
+//! results (`tests::images_that_are_there_become_what_the_processor_makes_of_them`
 //! checks the results).
 
-use std::ops::Range;
-use std::sync::Arc;
-
+use super::Options;
+use crate::consistency;
+use crate::device::Device;
+use crate::estimate::{Estimate, KnownEstimate};
+use crate::fusion;
+use crate::gpu::{Estimator, Fsrcnn, UNet};
+use crate::grid::FINE as SIDE;
+use crate::note::{Note, Notes};
+use crate::weights::{Weights, WeightsError};
 use nirspi_gpu::agreement::Agreement;
 use nirspi_gpu::limits::DeviceLimits;
 use nirspi_gpu::network::Degraded;
 use nirspi_gpu::network::plan::frames_at_once;
 use nirspi_gpu::{Buffer, GpuError, Kernels};
 use nirspi_recon::omp::gpu::DeviceImages;
+use std::ops::Range;
+use std::sync::Arc;
 
-use super::{Estimator, Fsrcnn, UNet};
-use crate::consistency;
-use crate::deblur::SIDE;
-use crate::device::{Device, Note, Notes};
-use crate::enhance::{KnownEstimate, Options};
-use crate::estimate::Estimate;
-use crate::fusion;
-use crate::network::{Guess, RunChain};
-use crate::weights::{Weights, WeightsError};
+/// The results for some images, on the host.
+#[derive(Default)]
+pub(super) struct Guess {
+    /// As the estimator found them.
+    pub(super) estimated: Vec<Estimate>,
+    /// (N, 64, 64) in [0, 1]: FSRCNN's output.
+    pub(super) start: Vec<f32>,
+    /// (N, 64, 64): the bridge's output after one step from `start`; not clamped if there are
+    /// `readings`, else in agreement with them.
+    pub(super) images: Vec<f32>,
+    /// The inconsistency of each image; none if there are `readings`.
+    pub(super) inconsistency: Vec<f32>,
+    /// (N, 32, 32) in [0, 1], if the device could not compute the agreement with them.
+    pub(super) readings: Vec<f32>,
+}
+
+impl Guess {
+    /// No results yet, and room for images with this number of pixels in all.
+    fn with_capacity(pixels: usize) -> Self {
+        let [start, images] = [(); 2].map(|()| Vec::with_capacity(pixels));
+        Self { start, images, ..Self::default() }
+    }
+}
 
 /// The three networks on one device.
-pub(crate) struct Chain {
+pub(super) struct Chain {
     engine: Arc<dyn Kernels>,
     fsrcnn: Fsrcnn,
     estimator: Estimator,
     unet: UNet,
     notes: Notes,
     /// What the device allows for the agreement.
-    pub(crate) limits: DeviceLimits,
+    pub(super) limits: DeviceLimits,
 }
 
 impl Chain {
@@ -41,7 +63,7 @@ impl Chain {
     ///
     /// # Errors
     /// [`WeightsError`] if a tensor is missing, of another shape, not finite, unknown, or too wide.
-    pub(crate) fn new(
+    pub(super) fn new(
         device: &Device,
         engine: &Arc<dyn Kernels>,
         [fsrcnn, estimator, bridge]: [&Weights; 3],
@@ -98,10 +120,13 @@ impl Chain {
         rest.extend_from_slice(last.floats());
         Ok(())
     }
-}
 
-impl RunChain for Chain {
-    fn run(
+    /// The results for some of the images, with `white` scaled to 1. `depth` is (N, 2, 32, 32), see
+    /// [`push_planes`](crate::fusion::push_planes); empty without depth.
+    ///
+    /// # Errors
+    /// [`GpuError`] if the GPU or its driver fails.
+    pub(super) fn run(
         &self,
         images: &DeviceImages,
         part: Range<usize>,
