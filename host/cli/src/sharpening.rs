@@ -29,7 +29,7 @@ pub struct Sharpening {
     /// Also write the repeatability of each pixel (.npy): its standard deviation if the same scene were measured again. An
     /// error that the network makes every time does not show in this number
     #[arg(long, value_name = "FILE")]
-    spread: Option<PathBuf>,
+    pub spread: Option<PathBuf>,
 }
 
 /// A network with the steps that --steps asks for.

@@ -10,19 +10,21 @@
 
 mod characters;
 mod charts;
+mod condition;
 mod contenders;
 mod depth;
 mod measure;
 mod others;
 
 pub use characters::{Character, Characters, Origin};
+pub use condition::Condition;
 pub use contenders::{Contender, Method, Version};
 pub use depth::{Depth, DepthRow, Use as DepthUse};
-pub use measure::{Condition, Figures};
+pub use measure::Figures;
 pub use others::Case;
 
 pub(crate) use characters::groups;
-pub(crate) use measure::halved;
+pub(crate) use condition::halved;
 
 use crate::error::Result;
 use image::RgbImage;

@@ -28,8 +28,8 @@ use crate::engine::{Engine, upload_halves};
 use cubecl::prelude::*;
 use finish::Ending;
 use half::f16;
-use kernels::{ROWS, Shape, UNITS};
-use plan::{COLUMNS, DEPTH, Geometry, pixels_a_unit};
+use kernels::Shape;
+use plan::{COLUMNS, DEPTH, Geometry, ROWS, UNITS, pixels_a_unit};
 use tiles::{Columns, Tiles};
 
 /// A convolution whose weights are on a device, in the order of its kernel.

@@ -25,6 +25,7 @@
 #![doc = include_str!("reconstruct/study.md")]
 
 mod explanation;
+mod frame;
 mod held_back;
 mod method;
 mod methods;
@@ -42,6 +43,7 @@ mod video;
 mod weight;
 
 pub use explanation::{Explanation, explanation};
+pub use frame::{believed_frame, fused_frame};
 pub use held_back::HeldBack;
 pub use method::{Method, MethodSettings, OwnAtoms, ParseMethodError, Reconstruct, Setting};
 pub use methods::hadamard;
@@ -50,7 +52,7 @@ pub use own_atoms::omp_over;
 pub use own_matrix::{
     DarkLevel, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix,
 };
-pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings, believed_frame, fused_frame};
+pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};
 pub use stacked::Stacked;

@@ -1,8 +1,8 @@
 //! `nirspi bench enhance`: times the learned stages.
 
 use super::RunArgs;
-use crate::deblur::in_steps;
 use crate::networks::say_notes;
+use crate::sharpening::in_steps;
 use crate::{print, provenance};
 use anyhow::Result;
 use nirspi_eval::bench::enhance::{Stages, Timed, time};

@@ -3,8 +3,9 @@
 
 use super::MIDDLE;
 use super::characters::Characters;
+use super::condition::Condition;
 use super::contenders::Method;
-use super::measure::{Condition, Figures};
+use super::measure::Figures;
 use image::RgbImage;
 use nirspi::picture::{Axis, Chart, Line, below};
 use nirspi_nets::classical::Method as Classical;

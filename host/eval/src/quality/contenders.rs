@@ -4,7 +4,7 @@
 //! Classical methods know blur and noise exactly, and networks know neither, so the networks' gain
 //! does not come from more knowledge (`tests::only_classical_methods_get_the_condition`).
 
-use super::measure::{Condition, sampling_variance};
+use super::condition::{Condition, sampling_variance};
 use crate::error::{EvalError, Result};
 use nirspi_nets::classical::{self, Method as Classical};
 use nirspi_nets::deblur::{self, Model};

@@ -10,8 +10,8 @@
 //! (`tests::without_different_distances_depth_changes_nothing`).
 
 use super::characters::{Character, Characters};
+use super::condition::{SIDE, sampling_variance};
 use super::contenders::interpolation_gain;
-use super::measure::{SIDE, sampling_variance};
 use crate::bootstrap::{DRAWS, Interval, Redraws};
 use crate::error::Result;
 use nirspi::picture::{Panel, Range, SideBySide, Unit};

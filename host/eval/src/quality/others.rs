@@ -3,8 +3,8 @@
 //! If the scene is known, PSNR before and after enhancement shows whether false strokes were added;
 //! the picture shows the strokes. Real measurements are used unchanged.
 
+use super::condition::{Condition, SIDE, halved};
 use super::contenders::Contender;
-use super::measure::{Condition, SIDE, halved};
 use super::{MIDDLE, UNTOUCHED};
 use crate::error::{EvalError, On, Result};
 use nirspi::files::image::read_reflectance;

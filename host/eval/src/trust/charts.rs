@@ -1,7 +1,6 @@
 //! The coverage curve, and a picture of images with their intervals, the worst among them.
 
-use super::learn::At;
-use super::shots::{Shot, Studio};
+use super::shots::{At, Shot, Studio};
 use super::{AREA, Covered, NATURAL};
 use crate::error::Result;
 use image::RgbImage;

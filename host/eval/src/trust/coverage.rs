@@ -1,8 +1,7 @@
 //! Coverage: the share of the pixels whose truth lies within its interval.
 
 use super::AREA;
-use super::learn::At;
-use super::shots::{LOW_CONTRAST, Shot, Studio};
+use super::shots::{At, LOW_CONTRAST, Shot, Studio};
 use crate::bootstrap::{DRAWS, Interval, Redraws};
 use crate::error::Result;
 use crate::quality::Characters;

@@ -1,6 +1,6 @@
 //! Makes the calibration from the calibration half.
 
-use super::shots::{Condition, LEAST_SHARE, MOST_NOISE, Shot, Studio};
+use super::shots::{At, Condition, LEAST_SHARE, MOST_NOISE, Shot, Studio};
 use super::{Half, Settings, enhancer, fingerprints, letters};
 use crate::error::Result;
 use crate::quality::{Characters, Origin};
@@ -63,9 +63,6 @@ pub fn calibrate(settings: &Settings, made_by: &str, done: &dyn Fn(usize)) -> Re
         characters,
     })
 }
-
-/// The stack and the number of a shot's image.
-pub(super) type At = (usize, usize);
 
 /// Each image by every method under conditions by chance. The learned method has seen some natural
 /// scenes in its training: it gets the others, as often.

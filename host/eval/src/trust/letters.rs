@@ -1,9 +1,8 @@
 //! Readings of characters: the temperature, what counts as a character, and how often something that
 //! is no character is called sure.
 
-use super::learn::At;
 use super::others::{Other, others};
-use super::shots::{Condition, Shot, Studio};
+use super::shots::{At, Condition, Shot, Studio};
 use super::{HALF_OF_TARGET, Half, Settings};
 use crate::error::{EvalError, Result};
 use crate::quality::Characters;

@@ -28,6 +28,9 @@ pub(super) const LOW_CONTRAST: f32 = 0.35;
 const FOCUS_MM: f64 = 300.0;
 const FARTHEST_MM: f64 = 600.0;
 
+/// The stack and the number of a shot's image.
+pub(super) type At = (usize, usize);
+
 /// How a shot is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Condition {

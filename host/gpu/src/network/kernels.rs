@@ -9,14 +9,8 @@
 #![allow(clippy::too_many_arguments)]
 
 use super::finish::{Ending, store};
-use super::plan::{COLUMNS, DEPTH};
+use super::plan::{COLUMNS, DEPTH, ROWS, UNITS};
 use cubecl::prelude::*;
-
-/// Number of units below each other; each has other pixels.
-pub(super) const ROWS: usize = 32;
-
-/// Number of units of a workgroup.
-pub(super) const UNITS: usize = COLUMNS * ROWS;
 
 /// Padding between the input channels of a step in shared memory, after the pixels. It makes the
 /// eight channels of a pixel go to eight different banks.

@@ -5,7 +5,6 @@
 //! loop after some 65 535 rounds without an error
 //! (`tests::a_convolution_of_too_many_rounds_is_refused`).
 
-use super::kernels::ROWS;
 use crate::limits::{BUFFER_BYTES, GROUPS, ROUNDS};
 
 /// Number of input channels in one step through shared memory. It equals [`COLUMNS`], so a unit
@@ -14,6 +13,12 @@ pub const DEPTH: usize = 8;
 
 /// Number of units side by side in a workgroup; each has other channels.
 pub const COLUMNS: usize = 8;
+
+/// Number of units below each other; each has other pixels.
+pub(super) const ROWS: usize = 32;
+
+/// Number of units of a workgroup.
+pub(super) const UNITS: usize = COLUMNS * ROWS;
 
 /// Possible numbers of channels that one unit computes for each of its pixels.
 const CHANNELS_A_UNIT: [usize; 4] = [8, 6, 4, 2];

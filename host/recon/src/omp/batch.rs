@@ -1,7 +1,7 @@
-//! Pursues many measurements of one dictionary at once, on a [`Backend`] chosen at run time.
+//! Pursues many measurements of one dictionary at once, on the processor.
 //!
 //! # Invariant
-//! On the processor each solution of a batch is the one that [`Solver::solve`] finds alone, bit for
+//! Each solution of a batch is the one that [`Solver::solve`] finds alone, bit for
 //! bit, whatever the number of threads (`omp::tests::batch::a_batch_is_a_loop`).
 
 use super::dictionary::{Dictionary, padded};
@@ -9,7 +9,7 @@ use super::path::Path;
 use super::pursuit::{Solver, energy};
 use super::referee::Referee;
 use super::scalar::Scalar;
-use super::{Backend, Limits, OmpError, Solution, finite};
+use super::{Limits, OmpError, finite};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
@@ -25,59 +25,7 @@ pub struct Problem<'d, D: ?Sized> {
 /// Largest number of measurements projected together: enough to share each read of the dictionary.
 const TOGETHER: usize = 16;
 
-/// Finds a sparse representation of each measurement in `y`. Each measurement has `measurements`
-/// numbers; one follows the other.
-///
-/// [`Backend::Auto`] is the processor here, because a GPU would need the dictionary's Gram matrix
-/// for this one call. For many batches of one matrix, keep a `gpu::DeviceDictionary`.
-///
-/// # Errors
-/// [`OmpError`] if the length of `y` is not a multiple of the dictionary's measurements, a number
-/// is not finite, a limit is negative or NaN, or the requested device is missing.
-pub fn solve_batch<T: Scalar, D: Dictionary<T> + ?Sized>(
-    problem: &Problem<'_, D>,
-    y: &[T],
-    backend: Backend,
-) -> Result<Vec<Solution>, OmpError> {
-    match backend {
-        Backend::Auto | Backend::Cpu => {
-            Ok(solve_batch_paths(problem, y)?.into_iter().map(Path::solution).collect())
-        }
-        Backend::Wgpu | Backend::Cuda => {
-            check(problem, y)?;
-            #[cfg(feature = "gpu")]
-            if let Some(device) = super::gpu::Device::open(backend)? {
-                let Problem { dictionary, limits } = problem;
-                return super::gpu::solve_batch_over(&device, *dictionary, limits, y);
-            }
-            Err(super::BackendError::not_built().into())
-        }
-    }
-}
-
-/// Pursues one measurement, with a solution for every number of atoms. [`Backend::Auto`] is the
-/// processor, because the processor finishes before a GPU has received the Gram matrix.
-///
-/// # Errors
-/// [`OmpError`] if `y` does not fit the dictionary or is not finite, a limit is negative or NaN, or
-/// the requested device is missing.
-pub fn solve_path<D: Dictionary<f32> + ?Sized>(
-    dictionary: &D,
-    limits: &Limits,
-    y: &[f32],
-    backend: Backend,
-) -> Result<Path<f32>, OmpError> {
-    let (Backend::Wgpu | Backend::Cuda) = backend else {
-        return Solver::new(dictionary, limits)?.solve(y);
-    };
-    #[cfg(feature = "gpu")]
-    if let Some(device) = super::gpu::Device::open(backend)? {
-        return super::gpu::path_over(&device, dictionary, limits, y);
-    }
-    Err(super::BackendError::not_built().into())
-}
-
-/// [`solve_batch`] on the processor; returns the whole [`Path`] of each pursuit.
+/// [`solve_batch`](super::solve_batch) on the processor; returns the whole [`Path`] of each pursuit.
 pub(super) fn solve_batch_paths<T: Scalar, D: Dictionary<T> + ?Sized>(
     problem: &Problem<'_, D>,
     y: &[T],
@@ -96,7 +44,7 @@ pub(super) fn solve_batch_with<T: Scalar, D: Dictionary<T> + ?Sized, R: Referee<
     on_all_cores(problem.dictionary, &problem.limits, y, referee_of)
 }
 
-fn check<T: Scalar, D: Dictionary<T> + ?Sized>(
+pub(super) fn check<T: Scalar, D: Dictionary<T> + ?Sized>(
     problem: &Problem<'_, D>,
     y: &[T],
 ) -> Result<(), OmpError> {

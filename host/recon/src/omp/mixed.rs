@@ -12,7 +12,7 @@ use super::dense::DenseDictionary;
 use super::path::Path;
 use super::pursuit::{Solver, energy};
 use super::referee::{BELIEVED, BELIEVED_ENERGY, DoubleReferee};
-use super::{Backend, Dictionary, Limits, OmpError, Scalar, Solution, Stop, solve_batch};
+use super::{Dictionary, Limits, OmpError, Scalar, Solution, Stop};
 use nalgebra::DMatrix;
 use std::sync::OnceLock;
 
@@ -59,8 +59,8 @@ impl Exact {
         let frame = |i: &usize| &y[i * measurements..(i + 1) * measurements];
         let again: Vec<f64> = doubtful.iter().flat_map(frame).copied().collect();
         let problem = Problem { dictionary: self.double(), limits: *limits };
-        for (&i, solution) in doubtful.iter().zip(solve_batch(&problem, &again, Backend::Cpu)?) {
-            solutions[i] = solution;
+        for (&i, path) in doubtful.iter().zip(solve_batch_paths(&problem, &again)?) {
+            solutions[i] = path.solution();
         }
         Ok(())
     }
@@ -104,11 +104,11 @@ impl MixedDictionary {
         Ok(MixedSolver { dictionary: self, limits: *limits, single, double: None, y: Vec::new() })
     }
 
-    /// [`solve_batch`] on the processor; also returns for how many measurements double precision
+    /// [`solve_batch`](super::solve_batch) on the processor; also returns for how many measurements double precision
     /// was used.
     ///
     /// # Errors
-    /// The errors of [`solve_batch`].
+    /// The errors of [`solve_batch`](super::solve_batch).
     pub fn solve_batch(
         &self,
         limits: &Limits,

@@ -11,7 +11,7 @@
 
 use super::prior::SharedNetwork;
 use super::report::{Reconstruction, Report};
-use super::{MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength, methods};
+use super::{MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength};
 use crate::{Backend, Basis, Measurements};
 use std::fmt;
 use std::str::FromStr;
@@ -141,25 +141,6 @@ pub(super) struct Entry {
 }
 
 impl Method {
-    /// Every built-in method, the simplest first.
-    pub const ALL: &'static [Self] = methods::ALL;
-
-    /// The inverse transform, with zeros for the patterns that were not measured: the quickest.
-    pub const HADAMARD: Self = methods::HADAMARD;
-
-    /// Orthogonal matching pursuit, the paper's method.
-    pub const OMP: Self = methods::OMP;
-
-    /// The method that held-back readings choose, the default.
-    pub const AUTO: Self = methods::AUTO;
-
-    /// Tikhonov's method, with a covariance prior.
-    pub const TIKHONOV: Self = methods::TIKHONOV;
-
-    /// The learned prior, which needs [`MethodSettings::network`]; `nirspi_nets::prior::settings`
-    /// has the shipped one.
-    pub const PRIOR: Self = methods::PRIOR;
-
     /// The method's name in a few words, for example `total variation`.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -1,4 +1,4 @@
-//! The list of the built-in methods. A new method is a file here and an entry in [`ALL`].
+//! The list of the built-in methods. A new method is a file here and an entry in [`Method::ALL`].
 
 mod auto;
 mod fista;
@@ -11,23 +11,36 @@ mod tikhonov;
 mod total_variation;
 
 use super::Method;
-pub(super) use auto::METHOD as AUTO;
 use fista::METHOD as FISTA;
-pub(super) use hadamard::METHOD as HADAMARD;
 pub use hadamard::hadamard;
-pub(super) use omp::METHOD as OMP;
-pub(super) use prior::METHOD as PRIOR;
-pub(super) use tikhonov::METHOD as TIKHONOV;
 use total_variation::METHOD as TOTAL_VARIATION;
 
-/// Every built-in method, in the order in which help texts and comparisons show them.
-pub(super) const ALL: &[Method] = &[
-    hadamard::METHOD,
-    omp::METHOD,
-    pseudo_inverse::METHOD,
-    tikhonov::METHOD,
-    fista::METHOD,
-    total_variation::METHOD,
-    prior::METHOD,
-    auto::METHOD,
-];
+impl Method {
+    /// Every built-in method, in the order in which help texts and comparisons show them: the simplest first.
+    pub const ALL: &'static [Self] = &[
+        hadamard::METHOD,
+        omp::METHOD,
+        pseudo_inverse::METHOD,
+        tikhonov::METHOD,
+        fista::METHOD,
+        total_variation::METHOD,
+        prior::METHOD,
+        auto::METHOD,
+    ];
+
+    /// The inverse transform, with zeros for the patterns that were not measured: the quickest.
+    pub const HADAMARD: Self = hadamard::METHOD;
+
+    /// Orthogonal matching pursuit, the paper's method.
+    pub const OMP: Self = omp::METHOD;
+
+    /// The method that held-back readings choose, the default.
+    pub const AUTO: Self = auto::METHOD;
+
+    /// Tikhonov's method, with a covariance prior.
+    pub const TIKHONOV: Self = tikhonov::METHOD;
+
+    /// The learned prior, which needs [`MethodSettings::network`](super::MethodSettings::network); `nirspi_nets::prior::settings`
+    /// has the shipped one.
+    pub const PRIOR: Self = prior::METHOD;
+}

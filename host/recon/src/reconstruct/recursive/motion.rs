@@ -76,6 +76,13 @@ pub(super) fn best_shift(
     best.1
 }
 
+impl Spectrum {
+    /// A shift of images of this side, on their rows.
+    pub fn shift(&self, shift: Shift) -> Operator {
+        Operator::new(self.side(), shift)
+    }
+}
+
 /// A shift on the rows of an image: separable, one matrix for each direction.
 pub(super) struct Operator {
     n: usize,

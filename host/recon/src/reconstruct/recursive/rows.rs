@@ -1,6 +1,5 @@
-//! Variances of Hadamard rows, from variances of cosines and under a shift of the image.
+//! Variances of Hadamard rows, from variances of cosines.
 
-use super::motion::{Operator, Shift};
 use crate::Side;
 use crate::basis::product;
 use crate::omp::sampled::WalshCosines;
@@ -32,8 +31,8 @@ impl Spectrum {
         rows
     }
 
-    /// A shift of images of this side, on their rows.
-    pub fn shift(&self, shift: Shift) -> Operator {
-        Operator::new(self.n, shift)
+    /// Side of the images.
+    pub fn side(&self) -> usize {
+        self.n
     }
 }

@@ -1,4 +1,6 @@
 use super::*;
+use crate::reconstruct::frame::{believed_frame, residual};
+use crate::reconstruct::{Reconstruct, Reconstruction};
 use crate::testing::{figure, noisy, scene, side};
 use crate::{Order, Rows};
 use proptest::prelude::*;
