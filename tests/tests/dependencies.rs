@@ -1,11 +1,16 @@
-//! Tests that the table of docs/architecture.md agrees with `cargo metadata`.
+//! Tests that the table of docs/architecture.md agrees with `cargo metadata`, and that modules of a crate use each
+//! other in one direction.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+mod modules;
+
+use modules::Crate;
 use nirspi_tests::root;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What one crate may depend on.
@@ -120,9 +125,9 @@ const CLI_LINES: usize = 6500;
 
 #[test]
 fn the_command_line_has_fewer_lines_than_its_limit() {
-    fn lines(folder: &std::path::Path) -> usize {
+    fn lines(folder: &Path) -> usize {
         let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-        let count = |path: std::path::PathBuf| match path.is_dir() {
+        let count = |path: PathBuf| match path.is_dir() {
             true => lines(&path),
             false => std::fs::read_to_string(&path).unwrap().lines().count(),
         };
@@ -232,4 +237,66 @@ fn the_program_itself_computes_nothing() {
         }
     }
     assert_eq!(computing(&packages), ["rayon"], "a forbidden dependency is found");
+}
+
+/// Modules of `nirspi` that use each other, and are still to be untied.
+const KNOTS: [&str; 3] = [
+    "calibration::file, calibration::kept",
+    "files::archive, files::fields, files::hdf5, files::mat, files::npy, files::stored, files::text",
+    "picture::layout, picture::signature",
+];
+
+/// The root of every library and program of this repository, of every workspace.
+fn crate_roots() -> Vec<PathBuf> {
+    fn search(folder: &Path, found: &mut Vec<PathBuf>) {
+        if folder.join("Cargo.toml").is_file() {
+            let sources = folder.join("src");
+            let programs = std::fs::read_dir(sources.join("bin")).into_iter().flatten();
+            let programs = programs.map(|entry| entry.unwrap().path());
+            let roots =
+                [sources.join("lib.rs"), sources.join("main.rs")].into_iter().chain(programs);
+            found.extend(roots.filter(|root| root.is_file()));
+        }
+        for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            let name = entry.file_name().unwrap().to_string_lossy();
+            // Built files, and data that is not part of the repository.
+            let skipped =
+                name.starts_with('.') || ["target", "shared", "node_modules"].contains(&&*name);
+            if entry.is_dir() && !entry.is_symlink() && !skipped {
+                search(&entry, found);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    search(&root().canonicalize().unwrap(), &mut found);
+    found.sort();
+    found
+}
+
+#[test]
+fn modules_of_a_crate_use_each_other_in_one_direction() {
+    let roots = crate_roots();
+    let named = |path: &str| roots.iter().any(|root| root.ends_with(path));
+    assert!(roots.len() > 25, "{roots:#?}");
+    assert!(named("host/src/lib.rs") && named("boards/app/src/lib.rs"), "{roots:#?}");
+    let repository = format!("{}/", root().canonicalize().unwrap().display());
+    let mut excused = BTreeSet::new();
+    let mut found = Vec::new();
+    for root in &roots {
+        for knot in Crate::read(root).knots() {
+            let modules = knot.modules.join(", ");
+            if root.ends_with("host/src/lib.rs") && KNOTS.contains(&&*modules) {
+                excused.insert(modules);
+            } else {
+                let text = format!("{}: {knot}", root.display());
+                found.push(text.replace(&repository, ""));
+            }
+        }
+    }
+    assert!(found.is_empty(), "a module belongs below those that use it:\n{}", found.join("\n"));
+    let untied: Vec<&str> = KNOTS.into_iter().filter(|knot| !excused.contains(*knot)).collect();
+    assert!(
+        untied.is_empty(),
+        "these modules no longer use each other, and KNOTS still names them: {untied:#?}"
+    );
 }
