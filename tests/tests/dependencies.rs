@@ -239,13 +239,6 @@ fn the_program_itself_computes_nothing() {
     assert_eq!(computing(&packages), ["rayon"], "a forbidden dependency is found");
 }
 
-/// Modules of `nirspi` that use each other, and are still to be untied.
-const KNOTS: [&str; 3] = [
-    "calibration::file, calibration::kept",
-    "files::archive, files::fields, files::hdf5, files::mat, files::npy, files::stored, files::text",
-    "picture::layout, picture::signature",
-];
-
 /// The root of every library and program of this repository, of every workspace.
 fn crate_roots() -> Vec<PathBuf> {
     fn search(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -280,23 +273,11 @@ fn modules_of_a_crate_use_each_other_in_one_direction() {
     assert!(roots.len() > 25, "{roots:#?}");
     assert!(named("host/src/lib.rs") && named("boards/app/src/lib.rs"), "{roots:#?}");
     let repository = format!("{}/", root().canonicalize().unwrap().display());
-    let mut excused = BTreeSet::new();
     let mut found = Vec::new();
     for root in &roots {
         for knot in Crate::read(root).knots() {
-            let modules = knot.modules.join(", ");
-            if root.ends_with("host/src/lib.rs") && KNOTS.contains(&&*modules) {
-                excused.insert(modules);
-            } else {
-                let text = format!("{}: {knot}", root.display());
-                found.push(text.replace(&repository, ""));
-            }
+            found.push(format!("{}: {knot}", root.display()).replace(&repository, ""));
         }
     }
     assert!(found.is_empty(), "a module belongs below those that use it:\n{}", found.join("\n"));
-    let untied: Vec<&str> = KNOTS.into_iter().filter(|knot| !excused.contains(*knot)).collect();
-    assert!(
-        untied.is_empty(),
-        "these modules no longer use each other, and KNOTS still names them: {untied:#?}"
-    );
 }

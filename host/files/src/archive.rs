@@ -7,10 +7,10 @@
 //! (`measurement::tests::a_changed_reading_is_caught_by_the_checksum`).
 
 use super::FileError;
-use super::array::{ArrayError, Header, MAX_MEMORY_BYTES, Sample, claims, has_shape};
-use super::fields::Field;
+use super::array::{ArrayError, Header, MAX_MEMORY_BYTES, NUMBERS, Sample, claims, has_shape};
+use super::field::Field;
 use super::plain::{kind_by_start, open_file};
-use super::stored::Stored;
+use super::stored::{EXPECTED, Stored, damaged};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
@@ -18,12 +18,8 @@ use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-/// The kind of file that a path should lead to, for error messages.
-const EXPECTED: &str = "a NumPy .npz archive";
 /// The suffix that NumPy appends to the name of an array.
 const MEMBER_SUFFIX: &str = ".npy";
-/// The numeric types that the reader accepts, for error messages.
-pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
 const MAX_FIELD_BYTES: u64 = 256 << 20;
@@ -211,8 +207,4 @@ pub fn encode(path: &Path, members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, FileE
     }
     let bytes = archive.finish().map_err(|error| FileError::io(path, "write", error.into()))?;
     Ok(bytes.into_inner())
-}
-
-pub(super) fn damaged(path: &Path, found: String) -> FileError {
-    FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED }
 }

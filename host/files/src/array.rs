@@ -21,6 +21,9 @@ pub(super) const MAX_AXES: usize = 32;
 /// writers.
 const MAX_HEADER_BYTES: u32 = 65_536;
 
+/// The numeric types that the reader accepts, for error messages.
+pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
+
 /// Why an array could not be read; [`super::FileError`] adds file and field.
 #[derive(Debug)]
 pub(super) enum ArrayError {

@@ -6,6 +6,7 @@
 
 use super::FileError;
 use super::archive::Archive;
+use super::field::{EXPECTED, Field};
 #[cfg(feature = "hdf5")]
 use super::hdf5::Hdf5;
 use super::mat::Mat;
@@ -16,9 +17,6 @@ use super::text;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// The kind of file that a path should lead to, for error messages.
-pub(super) const EXPECTED: &str =
-    "measurements: .npz, .npy, .mat, .h5, .csv or .txt, or a recording (.mcap)";
 /// The name of an array without a name, for error messages.
 pub(super) const UNNAMED: &str = "array";
 /// Number of first bytes that identify the format. An HDF5 file may begin after a block of 512
@@ -27,29 +25,6 @@ const START_BYTES: u64 = 520;
 const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// The largest `.mat` or HDF5 file taken into memory.
 const MAX_FILE_BYTES: u64 = 1 << 30;
-
-/// Numbers in C order, real or complex.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Field {
-    pub(super) shape: Vec<usize>,
-    pub(super) real: Vec<f64>,
-    /// The imaginary parts, as many as `real`; `None` for real numbers.
-    pub(super) imaginary: Option<Vec<f64>>,
-}
-
-impl Field {
-    /// A field of numbers that are stored with the first axis fastest. The axes are reversed and
-    /// the numbers keep their order.
-    pub(super) fn from_column_major(
-        shape: Vec<usize>,
-        real: &[f64],
-        imaginary: Option<&[f64]>,
-    ) -> Self {
-        let turn = |values: &[f64]| super::array::to_c_order(values, &shape);
-        let (real, imaginary) = (turn(real), imaginary.map(turn));
-        Self { shape, real, imaginary }
-    }
-}
 
 /// An open file.
 pub(super) struct Fields {

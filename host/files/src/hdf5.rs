@@ -5,7 +5,7 @@
 
 use super::FileError;
 use super::array::{MAX_AXES, has_shape, within_memory};
-use super::fields::Field;
+use super::field::Field;
 use hdf5_reader::error::Error;
 use hdf5_reader::messages::datatype::{CompoundField, Datatype};
 use hdf5_reader::{ByteOrder, Hdf5File, OpenOptions};

@@ -104,7 +104,10 @@ pub(crate) struct Noted(PathBuf);
 
 impl Noted {
     /// Makes it, so that no interrupt comes between the making and the note.
-    pub(crate) fn make<T>(path: &Path, make: impl FnOnce() -> io::Result<T>) -> io::Result<(T, Self)> {
+    pub(crate) fn make<T>(
+        path: &Path,
+        make: impl FnOnce() -> io::Result<T>,
+    ) -> io::Result<(T, Self)> {
         let mut all = unfinished();
         let made = make()?;
         all.push(path.to_owned());

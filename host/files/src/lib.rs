@@ -38,6 +38,8 @@ pub mod table;
 mod array;
 mod error;
 #[cfg(not(target_family = "wasm"))]
+mod field;
+#[cfg(not(target_family = "wasm"))]
 mod fields;
 #[cfg(feature = "hdf5")]
 mod hdf5;

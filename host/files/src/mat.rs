@@ -9,7 +9,7 @@
 
 use super::FileError;
 use super::array::{MAX_AXES, has_shape, within_memory};
-use super::fields::Field;
+use super::field::Field;
 use flate2::bufread::ZlibDecoder;
 use std::io::Read;
 use std::path::{Path, PathBuf};

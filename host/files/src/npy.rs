@@ -6,9 +6,8 @@
 //! (`tests::what_is_written_reads_back_bit_for_bit`).
 
 use super::FileError;
-use super::archive::NUMBERS;
-use super::array::{ArrayError, Header, MAGIC, MAX_AXES, Sample, shape_text};
-use super::fields::Field;
+use super::array::{ArrayError, Header, MAGIC, MAX_AXES, NUMBERS, Sample, shape_text};
+use super::field::Field;
 use super::plain::{kind_by_start, open_file};
 use std::borrow::Cow;
 use std::fs::File;

@@ -6,14 +6,16 @@
 //! (`measurement::tests::stack::a_changed_byte_of_a_stack_is_caught_by_the_checksum`).
 
 use super::FileError;
-use super::archive::damaged;
 use super::array::Header;
 use crc32fast::Hasher;
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// The kind of file that a path should lead to, for error messages.
+pub(super) const EXPECTED: &str = "a NumPy .npz archive";
 
 /// Numbers that one thread reads before it looks for more. Checksums of parts are joined one by
 /// one, so parts are not small.
@@ -177,4 +179,8 @@ impl Stored {
 /// Whether each of these numbers is finite, without an early end, so that the compiler uses vectors.
 fn all_finite(values: &[f64]) -> bool {
     values.iter().fold(true, |finite, value| finite & value.is_finite())
+}
+
+pub(super) fn damaged(path: &Path, found: String) -> FileError {
+    FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED }
 }

@@ -10,7 +10,7 @@
 //! line, under a heading with one comma, separates two columns.
 
 use super::FileError;
-use super::fields::{EXPECTED, Field};
+use super::field::{EXPECTED, Field};
 use super::plain::{is_heading, read_large_text, start_of_text};
 use std::path::Path;
 

@@ -10,9 +10,9 @@
 use super::bar::{self, draw_bar};
 use super::scale::{PERCENTILES, Range, Scale, Unit};
 use super::scale_bar::{self, draw_scale_bar};
-use super::signature::signed;
+use super::signature::{FOOTER, signed};
 use super::text::{Block, Font, Style};
-use super::{AMBER, BRIGHT, DIM, FRAME, GROUND, MIDDLE};
+use super::{AMBER, BRIGHT, FRAME, GROUND, MIDDLE};
 use crate::files::image::{Placed, encode_labelled, to_level};
 use crate::provenance::Provenance;
 use image::imageops::{self, FilterType};
@@ -345,8 +345,6 @@ const CAPTION: fn() -> Style =
     || Style { font: Font::mono(), size_px: 16.0, line_px: 22, colour: MIDDLE };
 pub(super) const WARNING: fn() -> Style =
     || Style { font: Font::sans(), size_px: 19.0, line_px: 26, colour: AMBER };
-pub(super) const FOOTER: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 18.0, line_px: 24, colour: DIM };
 
 /// A height and the space after it. A height of 0 gets no space.
 pub(super) fn spaced(height_px: u32, space_px: u32) -> u32 {

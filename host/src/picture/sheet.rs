@@ -5,8 +5,9 @@
 //! of how many (`tests::a_sheet_shows_the_first_and_the_last_and_says_how_many`).
 
 use super::bar::{self, draw_bar};
-use super::layout::{FOOTER, HEADER, WARNING, spaced, stretch_words};
+use super::layout::{HEADER, WARNING, spaced, stretch_words};
 use super::scale::{Range, Scale, Unit};
+use super::signature::FOOTER;
 use super::signature::signed;
 use super::text::{Block, Font, Style};
 use super::ticks::number;

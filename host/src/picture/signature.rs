@@ -1,11 +1,14 @@
 //! The line of provenance below a picture.
 
-use super::GROUND;
-use super::layout::FOOTER;
-use super::text::Block;
+use super::text::{Block, Font, Style};
+use super::{DIM, GROUND};
 use crate::files::image::encode_rgb;
 use crate::provenance::Provenance;
 use image::{RgbImage, imageops};
+
+/// The words below the images.
+pub(super) const FOOTER: fn() -> Style =
+    || Style { font: Font::sans(), size_px: 18.0, line_px: 24, colour: DIM };
 
 const LEFT_PX: u32 = 36;
 const BELOW_PX: u32 = 16;

@@ -1,7 +1,6 @@
 //! Files that are kept for a camera between sessions: what calibrations and flat fields share.
 
-use super::kept::path_with;
-use etcetera::HomeDirError;
+use etcetera::{BaseStrategy, HomeDirError, choose_base_strategy};
 use nirspi_files::identity::CameraIdentity;
 use nirspi_files::output::keep;
 use nirspi_files::{FileError, read_small_text};
@@ -232,5 +231,34 @@ impl Kept {
                 expected: expected.clone(),
             }),
         }
+    }
+}
+
+/// The path of a file of the camera with this serial number, with this ending.
+pub(super) fn path_with(serial: &str, ending: &str) -> Result<PathBuf, KeptFileError> {
+    let folder = choose_base_strategy()?.data_dir().join("nirspi").join("calibration");
+    Ok(folder.join(format!("{}.{ending}", file_name(serial))))
+}
+
+/// A serial number as a file name, unique for each serial number: every byte that is not a letter,
+/// digit, `-` or `_` becomes `%` and two digits.
+fn file_name(serial: &str) -> String {
+    serial
+        .bytes()
+        .map(|byte| match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' => char::from(byte).to_string(),
+            byte => format!("%{byte:02x}"),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn serial_numbers_become_file_names_one_each() {
+        assert_eq!(file_name("virtual-1"), "virtual-1");
+        assert_eq!(file_name("../a b%"), "%2e%2e%2fa%20b%25");
     }
 }

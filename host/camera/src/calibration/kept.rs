@@ -11,10 +11,9 @@
 //! A calibration of another camera, or of other gateware, is never applied
 //! (`tests::a_calibration_of_something_else_is_refused_in_one_line`).
 
-use super::file::{Kept, KeptFileError};
+use super::file::{Kept, KeptFileError, path_with};
 use crate::check::Check;
 use crate::response::Settling;
-use etcetera::{BaseStrategy, choose_base_strategy};
 use nirspi_files::clock::date;
 use nirspi_files::identity::CameraIdentity;
 use serde::{Deserialize, Serialize};
@@ -105,24 +104,6 @@ impl KeptCalibration {
 /// If the user has no home directory.
 pub fn path_of(serial: &str) -> Result<PathBuf, KeptFileError> {
     path_with(serial, ENDING)
-}
-
-/// The path of a file of the camera with this serial number, with this ending.
-pub(super) fn path_with(serial: &str, ending: &str) -> Result<PathBuf, KeptFileError> {
-    let folder = choose_base_strategy()?.data_dir().join("nirspi").join("calibration");
-    Ok(folder.join(format!("{}.{ending}", file_name(serial))))
-}
-
-/// A serial number as a file name, unique for each serial number: every byte that is not a letter,
-/// digit, `-` or `_` becomes `%` and two digits.
-fn file_name(serial: &str) -> String {
-    serial
-        .bytes()
-        .map(|byte| match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' => char::from(byte).to_string(),
-            byte => format!("%{byte:02x}"),
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -224,11 +205,5 @@ mod tests {
             let error = error(foreign);
             assert!(error.contains("expected a calibration") && error.lines().count() == 1);
         }
-    }
-
-    #[test]
-    fn serial_numbers_become_file_names_one_each() {
-        assert_eq!(file_name("virtual-1"), "virtual-1");
-        assert_eq!(file_name("../a b%"), "%2e%2e%2fa%20b%25");
     }
 }

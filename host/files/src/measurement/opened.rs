@@ -4,7 +4,8 @@ use super::readings::{NamedReadings, check_infinite, expected_of, found_names, r
 use super::reference::read_reference;
 use super::rows::{read_rows, read_side, shown};
 use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Selection};
-use crate::fields::{Field, Fields};
+use crate::field::Field;
+use crate::fields::Fields;
 use nirspi_recon::law::{Claim, OVERLOAD};
 use nirspi_recon::{Image, Rows, Side};
 use std::path::Path;

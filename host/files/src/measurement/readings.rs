@@ -4,7 +4,8 @@ use super::form::meaning;
 use super::layout::Layout;
 use super::{FileError, Form, Selection};
 use crate::array::has_shape;
-use crate::fields::{Field, Fields, UNNAMED};
+use crate::field::Field;
+use crate::fields::{Fields, UNNAMED};
 use crate::stored::Stored;
 use std::path::Path;
 

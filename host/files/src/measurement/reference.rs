@@ -2,7 +2,8 @@
 
 use super::FileError;
 use crate::array::shape_text;
-use crate::fields::{Field, Fields};
+use crate::field::Field;
+use crate::fields::Fields;
 use nirspi_recon::Side;
 
 /// The file's own images and their number: one, or one for each measurement.

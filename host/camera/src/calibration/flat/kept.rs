@@ -8,8 +8,7 @@
 //! (`super::tests::an_old_or_foreign_flat_field_is_refused_in_one_line`).
 
 use super::{FlatField, Measured, Sweeps};
-use crate::calibration::file::{Kept, KeptFileError};
-use crate::calibration::kept::path_with;
+use crate::calibration::file::{Kept, KeptFileError, path_with};
 use nirspi_files::clock::date;
 use nirspi_files::identity::CameraIdentity;
 use serde::{Deserialize, Serialize};
