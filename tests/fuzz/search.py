@@ -52,6 +52,9 @@ class Law:
     def __init__(self, line: str, search: pathlib.Path):
         self.name, self.reads, self.longest, readers = line.split("\t")
         self.readers = readers.split()
+        for reader in self.readers:
+            if not (ROOT / reader).is_file():
+                sys.exit(f"the law {self.name} names {reader}, which is not there")
         self.search = search
         self.corpus = TARGET / self.name
         self.seconds = 0.0

@@ -21,6 +21,8 @@ pub const LAWS: &[Law] = &[
         reads: "any bytes on a connection to the page, without a token and with one",
         readers: &[
             "host/serve/src/http.rs",
+            "host/serve/src/access.rs",
+            "host/serve/src/base_path.rs",
             "host/serve/src/guard.rs",
             "host/serve/src/token.rs",
             "host/serve/src/connections.rs",

@@ -36,9 +36,7 @@ pub const LAWS: &[Law] = &[
         reads: "the bytes of a command or of a camera's message",
         readers: &[
             "mcu/wire/src/message.rs",
-            "mcu/wire/src/identity.rs",
             "mcu/wire/src/samples.rs",
-            "mcu/wire/src/tail.rs",
             "host/camera/src/events.rs",
         ],
         holds: messages,
