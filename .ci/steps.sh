@@ -136,9 +136,9 @@ step_gpu() {
 # Networks and the program: both are built for this alone, and software Vulkan takes minutes for their kernels.
 step_gpu_program() {
     software_vulkan
-    gpu_tests -p nirspi-nets --features nirspi-nets/wgpu --lib -- gpu:: networks:: agreement:: weights::
+    gpu_tests -p nirspi-nets --features nirspi-nets/wgpu --lib -- gpu:: networks:: agreement:: weights:: enhance::device
     gpu_tests -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
-        omp:: gpu:: enhance::device sparse_problems:: a_gpu_enhances the_whole_of_the_pipeline
+        omp:: gpu:: sparse_problems:: a_gpu_enhances the_whole_of_the_pipeline
 }
 
 gpu_tests() {
