@@ -12,14 +12,14 @@ pub use run::Run;
 
 use crate::errors::{of_opening, refusal, refused};
 use crate::work::long;
+use nirspi::address::CameraAddress;
 use nirspi::capture::CalibrationPolicy;
-use nirspi::response::Settling;
 use nirspi::capture::{Calibration, CaptureError, CaptureOptions};
 use nirspi::causes::in_one_line;
 use nirspi::frame_time::HostClock;
 use nirspi::link::Link;
-use nirspi::address::CameraAddress;
 use nirspi::recording::Target;
+use nirspi::response::Settling;
 use nirspi::session::{IgnorePackets, Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi_virtual::{MemoryLink, calibrate_against_white, flat_field_against_white};

@@ -1,8 +1,8 @@
 //! Errors of the library as Python exceptions, with the text of the command line.
 
+use nirspi::address::OpenError;
 use nirspi::causes::in_one_line;
 use nirspi::files::FileError;
-use nirspi::address::OpenError;
 use nirspi::recording::RecordingError;
 use nirspi::source::SourceError;
 use pyo3::PyErr;

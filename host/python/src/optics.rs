@@ -2,11 +2,11 @@
 
 use crate::errors::{of_file, refusal, refused};
 use crate::work::long;
-use nirspi_virtual::{CameraModel, read_camera_model};
-use nirspi_virtual::weather::{WeatherError, is_drop_file, read_drops};
 use nirspi_eval::{camera_model as evaluated, rain as effects};
 use nirspi_optics::mie::Index;
 use nirspi_optics::rain::DropLaw;
+use nirspi_virtual::weather::{WeatherError, is_drop_file, read_drops};
+use nirspi_virtual::{CameraModel, read_camera_model};
 use pyo3::prelude::*;
 use serde::Serialize;
 use std::path::Path;

@@ -2,15 +2,15 @@
 //! program's own writers.
 
 use nirspi::capture::{Calibration, CaptureOptions, capture};
+use nirspi::identity::CameraIdentity;
 use nirspi::info::info;
 use nirspi::link::{Link, Received};
 use nirspi::recording::Target;
 use nirspi::session::Session;
-use nirspi::identity::CameraIdentity;
 use nirspi::setup::MeasurementSetup;
-use nirspi_virtual::{MemoryLink, OpticalFpga, VirtualCamera, VirtualOptics};
 use nirspi_optics::Scene;
 use nirspi_recon::Order;
+use nirspi_virtual::{MemoryLink, OpticalFpga, VirtualCamera, VirtualOptics};
 use nirspi_wire::{Command, Request, RunLength, encode, version};
 use std::io;
 use std::ops::ControlFlow;

@@ -7,13 +7,13 @@ use crate::measurement::FlatField;
 use crate::work::SIGNALS;
 use nirspi::account::LossCounters;
 use nirspi::calibration::CalibrationError;
-use nirspi::response::Settling;
 use nirspi::capture::{
     Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause, observe,
 };
 use nirspi::events;
 use nirspi::frame_time::{Clock, HostClock};
 use nirspi::integrate::Integrated;
+use nirspi::response::Settling;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi::source::Source;

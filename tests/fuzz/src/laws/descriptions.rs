@@ -2,12 +2,12 @@
 
 use crate::{Law, MIB, place, read, seeds};
 use nirspi::calibration::{KeptCalibration, KeptFlatField};
-use nirspi::response::Settling;
 use nirspi::files::order_table::read_order_table;
 use nirspi::files::settings::{Options, Takes, from_file};
-use nirspi_virtual::read_camera_model;
+use nirspi::response::Settling;
 use nirspi_optics::CameraModel;
 use nirspi_recon::{Order, Side};
+use nirspi_virtual::read_camera_model;
 use std::collections::BTreeMap;
 use std::time::UNIX_EPOCH;
 

@@ -1,10 +1,10 @@
 //! Bitstreams, the FPGA that is loaded with them, and release folders.
 
 use crate::{Law, MIB, place, read};
-use nirspi_update::{Component, MANIFEST, Release};
 use nirspi_mcu::ecp5::SlaveSpi;
 use nirspi_mcu::staging::{StagingLoader, stored};
 use nirspi_mcu::{BusError, GatewareLoader, Micros};
+use nirspi_update::{Component, MANIFEST, Release};
 use std::path::Path;
 
 pub const LAWS: &[Law] = &[

@@ -1,9 +1,9 @@
 //! Recordings, read and recovered.
 
 use crate::{Law, MIB, place, read, seeds};
+use nirspi::recording::tally_recording;
 use nirspi::recording::{Recording, RecordingInfo, recover};
 use nirspi::source::{Source, SourceOptions};
-use nirspi::recording::tally_recording;
 use std::path::Path;
 
 pub const LAWS: &[Law] = &[

@@ -1,9 +1,9 @@
 //! What a page, a script or any client sends to the live page's servers.
 
 use crate::{Law, MIB, is_one_line, read, seeds};
+use nirspi_recon::reconstruct::Method;
 use nirspi_serve::fuzzing::{Place, Still, TOKEN};
 use nirspi_serve::settings::{Change, MAX_FRAMES, MAX_SWEEPS, Offer, Settings};
-use nirspi_recon::reconstruct::Method;
 use std::cell::RefCell;
 
 pub const LAWS: &[Law] = &[

@@ -2,8 +2,8 @@
 
 use crate::{Law, MIB, is_one_line, seeds};
 use nirspi::events;
-use nirspi_virtual::serve_tunnel;
 use nirspi_hdl_model::{AdcSample, Gateware};
+use nirspi_virtual::serve_tunnel;
 use nirspi_wire::fpga::{CRC_BYTES, FpgaFrame, HEADER_BYTES, MAX_FRAME_BYTES, Sums, frame_bytes};
 use nirspi_wire::host_port::{self, READ_FRAME, READ_REGISTER, WRITE_REGISTER, seal, unseal};
 use nirspi_wire::packet::{
