@@ -36,7 +36,11 @@ const MAX_TEXT_MIB: u64 = 4;
 /// 84 MB.
 const MAX_LARGE_TEXT_MIB: u64 = 256;
 
-/// Reads a plain text file of at most 4 MiB, by [`decode`]. Every error names the path.
+/// Reads a plain text file of at most 4 MiB: UTF-16 where it begins with the mark of UTF-16, else UTF-8, without the
+/// mark.
+///
+/// # Errors
+/// [`FileError`] naming the path, if the file cannot be read or is no text; `expected` says what it should be.
 pub fn read_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_TEXT_MIB)?;
     decode(bytes).map_err(|NotText(found)| FileError::kind(path, found, expected))

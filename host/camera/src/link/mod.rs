@@ -1,5 +1,5 @@
 //! Byte links to a camera: TCP, a serial port, USB. The link in memory is in
-//! [`virtual_camera`](crate::virtual_camera).
+//! the crate `nirspi-virtual`.
 //!
 //! A link moves bytes and does not interpret packets. A browser has none of these links.
 
