@@ -34,11 +34,6 @@
 //! `gpu` adds the kernels for GPUs. The virtual camera is the crate `nirspi-virtual`, the live page
 //! `nirspi-serve`, updates of a camera `nirspi-update`, how good the camera is `nirspi-eval`.
 
-#![cfg_attr(
-    target_family = "wasm",
-    allow(dead_code, unused_imports, reason = "a browser has no files, and nothing to export to")
-)]
-
 pub use nirspi_camera::{
     account, calibration, check, events, exposure, fpga, frame_time, info, integrate, link,
     response, selftest, session, setup, signal, tally, versions,

@@ -1,6 +1,7 @@
 //! Opens plain files, reads text, and tells kinds of files apart.
 
 use super::FileError;
+#[cfg(not(target_family = "wasm"))]
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
@@ -34,6 +35,7 @@ pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u6
 const MAX_TEXT_MIB: u64 = 4;
 /// Largest text file of measurements: 32 sweeps of 256 x 256 pairs with 20 characters a reading are
 /// 84 MB.
+#[cfg(not(target_family = "wasm"))]
 const MAX_LARGE_TEXT_MIB: u64 = 256;
 
 /// Reads a plain text file of at most 4 MiB: UTF-16 where it begins with the mark of UTF-16, else UTF-8, without the
@@ -48,6 +50,7 @@ pub fn read_text(path: &Path, expected: &'static str) -> Result<String, FileErro
 
 /// Reads a plain text file of at most 256 MiB, by [`decode`]. Every error names the path. A heading
 /// may be in another code page than UTF-8.
+#[cfg(not(target_family = "wasm"))]
 pub(super) fn read_large_text(path: &Path, expected: &'static str) -> Result<String, FileError> {
     let bytes = read_bytes(path, expected, MAX_LARGE_TEXT_MIB)?;
     match UTF_16_MARKS.iter().any(|mark| bytes.starts_with(mark)) {
@@ -136,6 +139,7 @@ fn decode(bytes: Vec<u8>) -> Result<String, NotText> {
 }
 
 /// The text that a file with these first bytes begins with, if the file is text.
+#[cfg(not(target_family = "wasm"))]
 pub(super) fn start_of_text(start: &[u8]) -> Cow<'_, [u8]> {
     if UTF_16_MARKS.iter().any(|mark| start.starts_with(mark)) {
         let text = decode(start[..start.len() & !1].to_vec()).unwrap_or_default();

@@ -35,7 +35,7 @@ pub use scale::{PERCENTILES, Range, Scale, Unit};
 pub use sheet::Sheet;
 pub use signature::signed_png;
 pub use terminal::{Tones, half_blocks};
-pub(crate) use video::of_images as video;
+pub use video::of_images as video;
 
 pub use image::RgbImage;
 

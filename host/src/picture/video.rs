@@ -64,12 +64,8 @@ pub(super) fn encode(sheet: &Sheet<'_>, provenance: &Provenance) -> Video {
 }
 
 /// The bytes of a video of these images, all on one scale. There must be at least one image.
-pub(crate) fn of_images(
-    header: &str,
-    images: &[Image],
-    unit: Unit,
-    provenance: &Provenance,
-) -> Vec<u8> {
+#[must_use]
+pub fn of_images(header: &str, images: &[Image], unit: Unit, provenance: &Provenance) -> Vec<u8> {
     let side = images.first().map_or(1, |image| image.side().pixels());
     let values = images.iter().map(Image::pixels).collect();
     encode(&Sheet::new(header.to_owned(), side, values, unit), provenance).bytes
