@@ -9,10 +9,11 @@ steps=(
     "test            the README's test command: cargo test"
     "gpu             OMP's GPU kernels on software Vulkan; Debian"
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
-    "features        the library alone, and with its features that bring the others"
+    "features        the library, and the live page without its server, each without features"
     "package         each library crate makes a package; crates.io"
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
+    "size            how large the project is, beside the sizes that it is meant to have at most"
     "docs            documentation without warnings"
     "book            the documentation as a book without warnings; PyPI"
     "demo            the README's demo command, every command line of the pages, and the program's other long tests"
@@ -89,6 +90,8 @@ python_with() {
 }
 
 software_vulkan() { debian mesa-vulkan-drivers libvulkan1 || echo "no software Vulkan installed here"; }
+
+step_size() { python3 tests/size.py; }
 
 step_format() {
     cargo fmt --all --check
