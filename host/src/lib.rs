@@ -3,31 +3,18 @@
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
-//! Each line uses the lines above it, and no two modules use each other:
+//! `nirspi-files`, `nirspi-camera` and `nirspi-record` are here under one name: [`files`] with
+//! [`provenance`]; [`session`] and all that a camera says; [`capture`], [`recording`] and [`replay`]. Their
+//! front pages list their modules. This crate adds, each line using only the lines above it:
 //!
-//! * [`clock`] says the time, [`causes`] prints an error with its causes, [`heartbeat`] gives signs of
-//!   life of long work, [`stage_times`] measures it, [`boards`] lists the boards with firmware, [`about`]
-//!   says what a build contains,
-//! * [`identity`] says who a camera is, [`provenance`] where readings come from and what made a file of
-//!   them, [`files`] reads and writes what users see,
-//! * [`link`] moves bytes, [`session`] exchanges commands with a camera, [`events`] words its reports,
-//!   [`versions`] checks whether camera and program fit together, [`fpga`] says in words what an FPGA
-//!   answers, [`mod@info`] asks a camera who it is,
-//! * [`setup`] is what a camera shows and sums, [`exposure`] how long it looks, [`response`] how it
-//!   answers a step of light,
-//! * [`account`] counts every frame, [`integrate`] and [`tally`] make measurements of frames,
-//!   [`frame_time`] gives the frames of a camera times by this computer's clock,
-//! * [`calibration`] measures and keeps latency, settling and flat field, [`selftest`] makes each
-//!   [`check`] of a camera,
-//! * [`recording`] stores a measurement, [`replay`] plays it back as a camera, [`capture`] runs a
-//!   measurement and chooses its calibration, [`export`] writes it for other programs,
-//! * [`address`] opens the camera at an address, [`devices`] lists cameras, [`udev`] gives users access to
-//!   cameras on USB,
-//! * [`picture`] draws, [`scene`] is what a camera looks at, [`depth_image`] what its depth sensor sees in
-//!   its image,
+//! * [`heartbeat`] gives signs of life of long work, [`stage_times`] measures it, [`about`] says what a build
+//!   contains, [`udev`] gives users access to cameras on USB, [`depth_image`] is what a camera's depth sensor
+//!   sees in its image,
+//! * [`picture`] draws, [`scene`] is what a camera looks at,
 //! * [`source`] reads measurements from a file, a recording or a capture, `nirspi-recon` reconstructs
-//!   images, [`imaging`] scales, enhances and judges them and gives warnings, [`reconstruct`] makes an
-//!   image or many of what was read.
+//!   images, [`imaging`] scales, enhances and judges them and gives warnings,
+//! * [`reconstruct`] makes an image or many of what was read, [`export`] writes a recording for other
+//!   programs.
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and
 //! reads measurements, without typefaces or networks. The features `enhance` and `pictures` add these;

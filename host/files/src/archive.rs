@@ -44,7 +44,7 @@ impl Archive {
     /// Opens an archive of arrays (`.npz`).
     ///
     /// # Errors
-    /// [`FileError`] for a file that is none, or that is damaged.
+    /// [`FileError`] for a file of another kind, and for a damaged one.
     pub fn open(path: &Path) -> Result<Self, FileError> {
         let (mut file, _) = open_file(path, EXPECTED)?;
         let mut start = Vec::new();

@@ -1,30 +1,22 @@
 use super::*;
 use crate::testing::provenance;
-use nirspi::files::archive;
 use nirspi::files::image::encode_grey;
+use nirspi::files::{archive, npy};
 
-/// A `.npy` file (format 1.0) with the header's type and shape as Python text.
-fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
-    let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n");
+/// (1, 64, 64) bytes of -1.
+fn signed_bytes() -> Vec<u8> {
+    let header = "{'descr': '|i1', 'fortran_order': False, 'shape': (1, 64, 64), }\n";
     let length = u16::try_from(header.len()).unwrap();
-    [b"\x93NUMPY\x01\x00".as_slice(), &length.to_le_bytes(), header.as_bytes(), data].concat()
-}
-
-fn npy_f64(shape: &str, values: &[f64]) -> Vec<u8> {
-    npy("'<f8'", shape, &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>())
-}
-
-fn npy_i32(shape: &str, values: &[i32]) -> Vec<u8> {
-    npy("'<i4'", shape, &values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>())
+    [b"\x93NUMPY\x01\x00", &length.to_le_bytes()[..], header.as_bytes(), &[0xff; AREA_PX]].concat()
 }
 
 fn members() -> Vec<(&'static str, Vec<u8>)> {
     let mut x = vec![0.0; 3 * AREA_PX];
     x[AREA_PX + 40] = 200.0;
     vec![
-        ("x", npy_f64("(3, 64, 64)", &x)),
-        ("label", npy_i32("(3,)", &[0, 10, 61])),
-        ("family", npy_i32("(3,)", &[4, 4, 9])),
+        ("x", npy::encode(&[3, 64, 64], &x)),
+        ("label", npy::encode(&[3], &[0_i64, 10, 61])),
+        ("family", npy::encode(&[3], &[4_i64, 4, 9])),
     ]
 }
 
@@ -55,7 +47,7 @@ fn a_stack_is_read_with_classes_and_groups() {
 
 #[test]
 fn fractions_are_levels_too_and_bright_rims_make_a_photograph() {
-    let unit = npy_f64("(2, 64, 64)", &[0.5; 2 * AREA_PX]);
+    let unit = npy::encode(&[2, 64, 64], &[0.5; 2 * AREA_PX]);
     let stacks = read_members(&[("x", unit)]).unwrap();
     assert_eq!(stacks[0].image(0)[7], 128);
     assert_eq!(stacks[0].kind(), Kind::Photograph);
@@ -64,15 +56,15 @@ fn fractions_are_levels_too_and_bright_rims_make_a_photograph() {
 
 #[test]
 fn what_does_not_fit_is_named() {
-    let text = complaint(0, ("images", npy_f64("(1,)", &[0.0])));
+    let text = complaint(0, ("images", npy::encode(&[1], &[0.0])));
     assert!(text.contains("no `x`") && text.contains("(N, 64, 64)"), "{text}");
-    let text = complaint(0, ("x", npy_f64("(1, 32, 32)", &[0.0; 1024])));
+    let text = complaint(0, ("x", npy::encode(&[1, 32, 32], &[0.0; 1024])));
     assert!(text.contains("`x` has shape (1, 32, 32)"), "{text}");
-    let text = complaint(0, ("x", npy("'|i1'", "(1, 64, 64)", &[0xff; AREA_PX])));
+    let text = complaint(0, ("x", signed_bytes()));
     assert!(text.contains("`x` is -1 in image 0, expected 0 to 255"), "{text}");
-    let text = complaint(1, ("label", npy_i32("(3,)", &[0, 62, 1])));
+    let text = complaint(1, ("label", npy::encode(&[3], &[0_i64, 62, 1])));
     assert!(text.contains("`label` is 62 at [1], expected whole numbers from 0 to 61"), "{text}");
-    let text = complaint(2, ("family", npy_i32("(2,)", &[0, 1])));
+    let text = complaint(2, ("family", npy::encode(&[2], &[0_i64, 1])));
     assert!(text.contains("`family` has shape (2,)"), "{text}");
 }
 
