@@ -160,4 +160,5 @@ def main() -> None:
     table(chosen)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -4,7 +4,7 @@
 //! The block has the numbers that the measurements have one by one, and is refused in the same words
 //! (`tests::stack`).
 
-use super::opened::Opened;
+use super::opened::{Opened, is_reading};
 use super::readings::check_infinite;
 use super::{FileError, Form};
 use crate::stored::Stored;
@@ -111,19 +111,19 @@ impl<'o> Stack<'o> {
                 parts.map(copy).reduce(|| true, |a, b| a & b)
             }
         };
-        let sound = |one: &[f64]| keeps_the_law(&self.rows, one);
-        if finite {
-            return Ok(out.par_chunks(patterns).all(sound));
+        let sound = out.par_chunks(patterns).all(|one| keeps_the_law(&self.rows, one));
+        if finite && sound {
+            return Ok(true);
         }
         let mut read = vec![false; patterns];
         for one in out.chunks_exact(patterns) {
             check_infinite(self.opened.fields.path(), &self.opened.readings.name, one)?;
-            if one.iter().all(|value| value.is_nan()) {
+            if !one.iter().any(|&value| is_reading(value)) {
                 return Err(self.opened.no_pattern());
             }
-            read.iter_mut().zip(one).for_each(|(read, value)| *read |= !value.is_nan());
+            read.iter_mut().zip(one).for_each(|(read, &value)| *read |= is_reading(value));
         }
-        Ok(read.into_iter().all(|read| read) && out.par_chunks(patterns).all(sound))
+        Ok(sound && read.into_iter().all(|read| read))
     }
 
     /// Makes something of each measurement, on all threads: `make` gets the differences of a measurement and the places

@@ -137,6 +137,9 @@ fn a_block_is_refused_in_the_words_of_its_measurements_and_keeps_what_was_not_re
         [1.0, 2.0, 3.0, 4.0, f64::INFINITY, 6.0],
         [NAN, NAN, NAN, 4.0, f64::NEG_INFINITY, 6.0],
         [1.0, 2.0, 3.0, NAN, NAN, NAN],
+        // An instrument's word for overload, alone and beside NaN.
+        [9.0, 2.0, 3.0, 9.9e37, 9.9e37, 9.9e37],
+        [9.0, NAN, 3.0, 9.9e37, NAN, -9.9e37],
     ] {
         let bytes = of(&wrong);
         let told = line(&block(&bytes).unwrap_err(), "lab.npz");
