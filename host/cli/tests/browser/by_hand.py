@@ -150,20 +150,21 @@ class Told:
         route.fulfill(**self.answer)
 
     def tell(self, **changes):
-        """Tells the page its message, of which parts of the state change for good."""
+        """Tells the page its message, of which parts of the state change for good. What it then says of the LEDs at once."""
         for part, change in changes.items():
             state = self.message["state"]
             state[part] = state[part] | change if isinstance(change, dict) and state[part] else change
         self.state_number += 1
         self.message["state"]["number"] = self.state_number
         # The page asks again when it has shown what it was told.
-        self.page.evaluate(
+        return self.page.evaluate(
             """async message => {
           const until = async is => { while (!is()) await new Promise(done => setTimeout(done, 5)); };
           await until(() => asks.length);
           const before = asked;
           tell(message);
           await until(() => asked > before);
+          return document.getElementById("leds").innerText;
         }""",
             json.dumps(self.message),
         )
@@ -683,12 +684,11 @@ def stream(browser, address):
 def silent(told):
     """A link on which nothing comes any more, without an end: the page says how old its state is, and believes no old message."""
     page, leds = told.page, told.page.locator("#leds")
-    told.tell(camera={"phase": "stopped", "leds": "off"}, light={"allowed": False})
-    told.has("leds", "LEDs off, stopped")
+    assert told.tell(camera={"phase": "stopped", "leds": "off"}, light={"allowed": False}) == "LEDs off, stopped"
     page.evaluate("() => { isSilent = true; }")
-    page.wait_for_timeout(1500)
+    page.wait_for_timeout(1000)
     told.has("leds", "LEDs off, stopped")
-    page.wait_for_timeout(1100)
+    page.wait_for_timeout(1600)
     assert re.fullmatch(r"LEDs unknown, last seen \d s ago: no answer from nirspi serve", leds.inner_text()), leds.inner_text()
     told.has("line", "nirspi serve does not answer; trying again")
     assert page.locator("body").get_attribute("data-phase") == "unserved"
@@ -708,14 +708,13 @@ def silent(told):
     expect(leds).to_have_text("LEDs off, stopped")
     expect(page.locator("#scrub-text")).to_have_text("live")
     # The camera's word was old when the state brought it: both ages together count.
-    told.tell(camera={"leds": "off", "leds_age_ms": 1900})
-    told.has("leds", "LEDs off, stopped")
+    assert told.tell(camera={"leds": "off", "leds_age_ms": 1500}) == "LEDs off, stopped"
     page.evaluate("() => { isSilent = true; }")
-    expect(leds).to_have_text("LEDs unknown, last seen 2 s ago: no answer from the camera", timeout=1500)
+    expect(leds).to_have_text("LEDs unknown, last seen 2 s ago: no answer from the camera", timeout=2000)
     page.evaluate("() => { isSilent = false; }")
     # The server's own link to the camera is silent.
-    told.tell(camera={"leds": "unknown", "leds_age_ms": 4100})
-    told.has("leds", "LEDs unknown, last seen 4 s ago: no answer from the camera")
+    told_of = told.tell(camera={"leds": "unknown", "leds_age_ms": 4100})
+    assert told_of == "LEDs unknown, last seen 4 s ago: no answer from the camera", told_of
     told.tell(camera={"phase": "measuring", "leds": "on", "leds_age_ms": 0}, light={"allowed": True})
 
 
