@@ -19,7 +19,7 @@ impl StageTimes {
         Self { watch: Some(watch), ..Self::default() }
     }
 
-    /// Runs a stage and records its time in milliseconds.
+    /// Runs a stage, or a further part of it, and adds its time in milliseconds.
     pub fn time<T>(&mut self, stage: &str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
@@ -27,7 +27,8 @@ impl StageTimes {
         if let Some(watch) = self.watch {
             watch(stage, ms);
         }
-        self.times.insert(stage.to_owned(), serde_json::json!((ms * 1e3).round() / 1e3));
+        let all = self.of(stage) + ms;
+        self.times.insert(stage.to_owned(), serde_json::json!((all * 1e3).round() / 1e3));
         result
     }
 

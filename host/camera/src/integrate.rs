@@ -18,6 +18,8 @@ pub struct Integrated {
     sweeps: u64,
     flags: FrameFlags,
     spread: Spread,
+    /// The noise of a sweep, if other frames have told it.
+    known: Option<f64>,
 }
 
 impl Integrated {
@@ -34,6 +36,7 @@ impl Integrated {
             sweeps: 0,
             flags: FrameFlags::default(),
             spread: Spread::default(),
+            known: None,
         }
     }
 
@@ -111,8 +114,22 @@ impl Integrated {
     /// differs between the frames; `None` for fewer than two frames.
     #[must_use]
     pub fn noise(&self, setup: &MeasurementSetup) -> Option<f64> {
-        let of_a_sweep = self.spread.of_a_sweep()?;
+        let of_a_sweep = self.noise_of_a_sweep()?;
         Some(of_a_sweep / (self.sweeps as f64).sqrt() / f64::from(setup.window()))
+    }
+
+    /// Standard deviation of the noise of the sum of one sweep, from what differs between the frames;
+    /// `None` for fewer than two frames.
+    #[must_use]
+    pub fn noise_of_a_sweep(&self) -> Option<f64> {
+        self.known.or_else(|| self.spread.of_a_sweep())
+    }
+
+    /// The same sum, with the [noise of a sweep](Self::noise_of_a_sweep) that all frames of its run show:
+    /// a frame alone tells none.
+    #[must_use]
+    pub fn with_noise_of_a_sweep(self, known: Option<f64>) -> Self {
+        Self { known, ..self }
     }
 
     /// Measurements in ADC counts, with their [noise](Self::noise). With the camera's response, the dark level is subtracted from
@@ -171,13 +188,15 @@ fn with_noise(
 pub struct Newest {
     frames: VecDeque<Integrated>,
     total: Integrated,
+    /// The frame before the oldest: one frame alone does not tell its noise.
+    before: Option<Integrated>,
 }
 
 impl Newest {
     /// A sum without frames.
     #[must_use]
     pub fn new(setup: &MeasurementSetup) -> Self {
-        Self { frames: VecDeque::new(), total: Integrated::new(setup) }
+        Self { frames: VecDeque::new(), total: Integrated::new(setup), before: None }
     }
 
     /// Adds a frame that [fits](Integrated::fits), and keeps only the newest `most` frames, at
@@ -190,6 +209,7 @@ impl Newest {
             }
             self.total.frames -= oldest.frames;
             self.total.sweeps -= oldest.sweeps;
+            self.before = Some(oldest);
         }
         let mut alone = Integrated::of_patterns(self.total.sums.len());
         alone.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
@@ -198,13 +218,14 @@ impl Newest {
         self.frames.push_back(alone);
     }
 
-    /// The sum of the frames.
+    /// The sum of the frames. Its noise is known from two frames of the run on, also where it is a sum of
+    /// one.
     #[must_use]
     pub fn sum(&self) -> Integrated {
         // Flags cannot be subtracted, so they are collected anew.
         let flags = self.frames.iter().fold(FrameFlags::default(), |all, f| all.with(f.flags));
         let mut spread = Spread::default();
-        for frame in &self.frames {
+        for frame in self.before.iter().chain(&self.frames) {
             spread.add(frame.sums.iter().copied(), frame.sweeps);
         }
         Integrated { flags, spread, ..self.total.clone() }
@@ -237,6 +258,27 @@ mod tests {
         take(&Frame { run: 1, sequence: 0, device_time_us: 0, sweeps: 2, flags, samples })
     }
 
+    #[test]
+    fn the_noise_of_one_frame_is_that_of_its_run() {
+        let setup = MeasurementSetup::new(&Order::Natural, 4.0 / 1024.0).unwrap();
+        let (mut run, mut alone) = (Integrated::new(&setup), Integrated::new(&setup));
+        let mut newest = Newest::new(&setup);
+        for frame in [[100, 20, -7, 3], [104, 16, -3, -1], [100, 20, -7, 3]] {
+            with_frame(&frame, FrameFlags::default(), |frame| {
+                run.add(frame);
+                newest.push(frame, 1);
+            });
+        }
+        with_frame(&[100, 20, -7, 3], FrameFlags::default(), |frame| alone.add(frame));
+        assert_eq!(alone.noise(&setup), None);
+        let alone = alone.with_noise_of_a_sweep(run.noise_of_a_sweep());
+        let (of_run, of_one) = (run.noise(&setup).unwrap(), alone.noise(&setup).unwrap());
+        assert!((of_one / of_run - 3.0_f64.sqrt()).abs() < 1e-9, "{of_one} {of_run}");
+        // A live view of one frame looks at the frame before.
+        let shown = newest.sum().noise(&setup).unwrap();
+        assert!((0.5..2.0).contains(&(shown / of_one)), "{shown} {of_one}");
+    }
+
     proptest! {
         #[test]
         fn the_newest_frames_sum_to_what_they_sum_to_alone(
@@ -256,7 +298,12 @@ mod tests {
                 let sum = newest.sum();
                 prop_assert_eq!(sum.frames(), kept as u64);
                 prop_assert_eq!(sum.means(&setup), expected.means(&setup));
-                prop_assert_eq!(sum.noise(&setup), expected.noise(&setup));
+                // The noise is that of these frames and of the one before.
+                let mut with_before = Integrated::new(&setup);
+                for (values, over, _) in &frames[at.saturating_sub(kept)..=at] {
+                    with_frame(values, flag(*over), |frame| with_before.add(frame));
+                }
+                prop_assert_eq!(sum.noise_of_a_sweep(), with_before.noise_of_a_sweep());
                 prop_assert_eq!(sum.warnings(), expected.warnings());
             }
         }

@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return matrix::run(args, path);
     }
     if args.source.index == Some(Index::All) {
-        return stack::run(args, &first);
+        return stack::run(args, first);
     }
     if args.warm_start {
         return Err(Usage("--warm-start belongs to --index all".to_owned()).into());

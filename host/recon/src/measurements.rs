@@ -19,6 +19,16 @@ pub struct Measurements {
     rows: Rows,
     values: Vec<f64>,
     noise: Option<f64>,
+    kind: Option<Kind>,
+}
+
+/// What many measurements of one kind say of each: an estimate, where the camera measured no noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Kind {
+    /// Standard deviation of the noise of a value, in the values' units.
+    pub noise: f64,
+    /// Power of the frequency with which the scenes' amplitudes fall.
+    pub falloff: f64,
 }
 
 /// What is wrong with a set of measurements. The caller adds the name of the file.
@@ -77,7 +87,7 @@ impl Measurements {
     pub fn from_differential(rows: &Rows, d: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("d", d.len(), rows.len())?;
         expect_finite("d", d)?;
-        Ok(Self { rows: rows.clone(), values: d.to_vec(), noise: None })
+        Ok(Self { rows: rows.clone(), values: d.to_vec(), noise: None, kind: None })
     }
 
     /// Measurements from readings of the positive patterns alone (light where `H` is +1):
@@ -99,7 +109,7 @@ impl Measurements {
         };
         let values: Vec<f64> = y.iter().map(|y| 2.0 * y - all_ones).collect();
         expect_finite("d", &values)?;
-        Ok(Self { rows: rows.clone(), values, noise: None })
+        Ok(Self { rows: rows.clone(), values, noise: None, kind: None })
     }
 
     /// Removes the effect of a dark level in every reading (ambient light, an ADC's offset) from
@@ -140,7 +150,7 @@ impl Measurements {
 
     /// Measurements that are known to be one finite value for each row.
     pub(crate) fn trusted(rows: Rows, values: Vec<f64>) -> Self {
-        Self { rows, values, noise: None }
+        Self { rows, values, noise: None, kind: None }
     }
 
     /// Replaces the value at a position by a finite one.
@@ -151,7 +161,7 @@ impl Measurements {
     /// The measurements at these positions, in that order.
     pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();
-        Self { rows: Rows::trusted(self.side(), rows), values, noise: self.noise }
+        Self { rows: Rows::trusted(self.side(), rows), values, noise: self.noise, kind: self.kind }
     }
 
     /// These measurements with the standard deviation of the noise of one value, in the values'
@@ -168,6 +178,16 @@ impl Measurements {
         }
         self.noise = Some(noise);
         Ok(self)
+    }
+
+    /// The same measurements, of a kind of which this is known.
+    #[must_use]
+    pub(crate) fn of_kind(self, kind: Kind) -> Self {
+        Self { kind: Some(kind), ..self }
+    }
+
+    pub(crate) fn kind(&self) -> Option<Kind> {
+        self.kind
     }
 
     /// Standard deviation of the noise of one value, in the values' units, if it was

@@ -13,6 +13,7 @@
 //! | [`Dictionary`] | the interface of a dictionary: projections, and columns of the Gram matrix |
 //! | [`DenseDictionary`] | a dictionary that is a matrix |
 //! | [`MixedDictionary`] | the same in `f32`, with choices in `f64` where `f32` cannot distinguish two atoms |
+//! | [`Remembered`] | any dictionary, with columns of the Gram matrix that are computed once |
 //! | [`nonnegative`] | non-negative coefficients |
 //! | [`sampled`] | Hadamard measurements of an image, by fast transforms, without a stored matrix |
 //! | `gpu` | the same on a GPU, in `f32`; with the feature of that name |
@@ -44,6 +45,7 @@ mod path;
 mod pursuit;
 mod referee;
 pub mod reference;
+mod remembered;
 pub mod sampled;
 mod scalar;
 
@@ -56,6 +58,7 @@ pub use mixed::{MixedDictionary, MixedSolver};
 pub use on_backend::{solve_batch, solve_path};
 pub use path::Path;
 pub use pursuit::{Solver, error_bound};
+pub use remembered::Remembered;
 pub use scalar::Scalar;
 
 use thiserror::Error;

@@ -27,6 +27,7 @@
 mod explanation;
 mod frame;
 mod held_back;
+mod kind;
 mod method;
 mod methods;
 mod noise;
@@ -38,6 +39,7 @@ mod recursive;
 mod regularised;
 mod report;
 mod selection;
+mod stack;
 mod stacked;
 mod video;
 mod weight;
@@ -55,11 +57,13 @@ pub use own_matrix::{
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};
+pub use stack::stack;
 pub use stacked::Stacked;
 pub use video::{VideoFrame, omp_video};
 pub use weight::WITHIN;
 
 use crate::basis::{Basis, Transform};
+use crate::measurements::Kind;
 use crate::omp::sampled::{Prior, SampledHadamard, visible_energy};
 use crate::omp::{Backend, Limits, OmpError, Stop};
 use crate::{Image, Measurements, Order, Rows, Side, fwht};
@@ -378,6 +382,7 @@ impl Made {
 
 /// Measurements and prior in orthonormal units, scaled so that the largest measurement is 1. So
 /// picoamperes and ADC sums are equally far from the limits of `f32`.
+#[derive(Clone)]
 struct Problem<'a> {
     side: Side,
     rows: &'a Rows,
@@ -406,13 +411,13 @@ impl<'a> Problem<'a> {
         let side = measurements.side();
         let rows = measurements.rows();
         let n = side.pixels() as f64;
-        let largest = measurements.values().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        let unit = if largest > 0.0 { largest / n } else { 1.0 };
-        let values: Vec<f32> =
-            measurements.values().iter().map(|v| (v / n / unit) as f32).collect();
+        let (values, unit) = in_units(measurements);
         let transform = Transform::new(basis, side);
         let in_units = |sigma: f64| (sigma / n / unit) as f32;
-        let statistics = falloff.is_none().then(|| Statistics::of(rows, &values));
+        let of_kind =
+            |kind: Kind| Statistics { noise: in_units(kind.noise), falloff: kind.falloff };
+        let alone = || falloff.is_none().then(|| Statistics::of(rows, &values));
+        let statistics = measurements.kind().map(of_kind).or_else(alone);
         let (noise, reading_noise) = match noise {
             NoiseLevel::Known(sigma) => (in_units(sigma), Some(in_units(sigma))),
             NoiseLevel::Estimated => {
@@ -438,7 +443,15 @@ impl<'a> Problem<'a> {
         problem
     }
 
-    /// Measurements of the same rows.
+    /// The same problem with other measurements of the same rows, whose noise is known.
+    fn read(&mut self, measurements: &'a Measurements) {
+        (self.values, self.unit) = in_units(measurements);
+        let noise = measurements.noise().or(measurements.kind().map(|kind| kind.noise));
+        self.reading_noise =
+            noise.map(|sigma| (sigma / self.side.pixels() as f64 / self.unit) as f32);
+    }
+
+    /// Measurements of the same rows, in units of this problem.
     fn in_units(&self, measurements: &Measurements) -> Vec<f32> {
         let n = self.side.pixels() as f64;
         measurements.values().iter().map(|v| (v / n / self.unit) as f32).collect()
@@ -499,6 +512,14 @@ impl<'a> Problem<'a> {
     fn limits(&self) -> Limits {
         Limits { sparsity: 0, residual: self.residual, noise: f64::from(self.to_noise) }
     }
+}
+
+/// The measurements in units of the largest, and this unit, both orthonormal.
+fn in_units(measurements: &Measurements) -> (Vec<f32>, f64) {
+    let n = measurements.side().pixels() as f64;
+    let largest = measurements.values().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let unit = if largest > 0.0 { largest / n } else { 1.0 };
+    (measurements.values().iter().map(|v| (v / n / unit) as f32).collect(), unit)
 }
 
 /// Expected size of each coefficient: proportional to `frequency^-falloff`, and scaled so that the

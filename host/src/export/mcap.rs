@@ -117,8 +117,9 @@ fn each(
     let problem = |frame| move |problem| ExportError::Image { path: path.clone(), frame, problem };
     let method = Method::default().prepare(&super::settings()).map_err(problem(0))?;
     let method = Stacked::new(method);
-    let image = |sum: &Integrated, frame: usize| -> Result<[Image; 2], ExportError> {
+    let image = |sum: Integrated, frame: usize| -> Result<[Image; 2], ExportError> {
         let measurements = sum
+            .with_noise_of_a_sweep(whole.noise_of_a_sweep)
             .measurements(&setup, settling.as_ref(), whole.keep_leak)
             .map_err(|problem| whole.integrate(problem))?;
         let made = method.reconstruct(&measurements).map_err(problem(frame))?;
@@ -136,9 +137,9 @@ fn each(
             if let Some((before, time_ns)) = open
                 && before != number
             {
-                let [shown, given] = image(&sum, frames)?;
+                let summed = std::mem::replace(&mut sum, Integrated::new(&setup));
+                let [shown, given] = image(summed, frames)?;
                 on(What::Image(time_ns, shown, given))?;
-                sum = Integrated::new(&setup);
             }
             sum.add(frame);
             open = Some((number, heard.time_ns));
@@ -148,7 +149,7 @@ fn each(
     })?;
     match open {
         Some((_, time_ns)) => {
-            let [shown, given] = image(&sum, frames)?;
+            let [shown, given] = image(sum, frames)?;
             on(What::Image(time_ns, shown, given))
         }
         None => Ok(()),

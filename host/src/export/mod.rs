@@ -257,6 +257,8 @@ struct Whole {
     setup: MeasurementSetup,
     /// The mean of all frames.
     source: Source,
+    /// Standard deviation of the sum of one sweep, by all frames.
+    noise_of_a_sweep: Option<f64>,
     sequence: Vec<i64>,
     device_time_us: Vec<i64>,
     time_ns: Vec<i64>,
@@ -280,6 +282,7 @@ impl Whole {
             keep_leak: options.keep_leak,
             setup: recording.setup.clone(),
             source: source::of_sum(path, options, &recording, &tally)?,
+            noise_of_a_sweep: tally.integrated().noise_of_a_sweep(),
             sequence,
             device_time_us,
             time_ns,
@@ -309,6 +312,7 @@ impl Whole {
                 return Err(ExportError::Changed(self.path.clone()));
             }
             let measurements = alone(frame, &setup)
+                .with_noise_of_a_sweep(self.noise_of_a_sweep)
                 .measurements(&setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
             on(index, &measurements)?;

@@ -4,7 +4,7 @@ use super::{ExportError, Whole};
 use crate::files::output::{Existing, write_result};
 use crate::picture::{Unit, video};
 use crate::provenance::Provenance;
-use nirspi_recon::reconstruct::{Method, Reconstruct, Stacked};
+use nirspi_recon::reconstruct::{Method, stack};
 use nirspi_recon::{Image, Measurements};
 use std::path::Path;
 
@@ -28,8 +28,9 @@ impl Groups {
         Self { frames, each: frames.div_ceil(most), seen: 0, sum: Vec::new() }
     }
 
-    /// Adds the values of the next frame. Returns the mean of its group after the group's last frame.
-    fn add(&mut self, values: &[f64]) -> Option<Vec<f64>> {
+    /// Adds the values of the next frame. After the last frame of a group, returns the mean of the group and
+    /// its number of frames.
+    fn add(&mut self, values: &[f64]) -> Option<(Vec<f64>, usize)> {
         if self.sum.is_empty() {
             self.sum = values.to_vec();
         } else {
@@ -43,7 +44,7 @@ impl Groups {
         // A mean of one frame is the frame itself.
         let mut mean = std::mem::take(&mut self.sum);
         mean.iter_mut().for_each(|value| *value /= in_group as f64);
-        Some(mean)
+        Some((mean, in_group))
     }
 }
 
@@ -56,22 +57,24 @@ pub(super) fn apng(
 ) -> Result<usize, ExportError> {
     let frames = whole.frames();
     let mut groups = Groups::new(frames, MOST);
-    let problem = |frame| {
-        let path = whole.path.clone();
-        move |problem| ExportError::Image { path, frame, problem }
-    };
-    let method = Method::default().prepare(&super::settings()).map_err(problem(0))?;
-    let method = Stacked::new(method);
-    let mut images: Vec<Image> = Vec::new();
-    whole.each(|index, measurements| {
-        if let Some(mean) = groups.add(measurements.values()) {
-            let mean = Measurements::from_differential(measurements.rows(), &mean)
-                .map_err(|problem| whole.integrate(problem.into()))?;
-            let made = method.reconstruct(&mean).map_err(problem(index))?;
-            images.push(whole.source.flattened(made.image));
+    let problem = |problem| ExportError::Image { path: whole.path.clone(), frame: 0, problem };
+    let method = Method::default().prepare(&super::settings()).map_err(problem)?;
+    let mut means = Vec::new();
+    whole.each(|_, measurements| {
+        if let Some((mean, frames)) = groups.add(measurements.values()) {
+            let mean = Measurements::from_differential(measurements.rows(), &mean);
+            let noise = measurements.noise().map(|noise| noise / (frames as f64).sqrt());
+            let mean = match noise {
+                Some(noise) => mean.and_then(|mean| mean.with_noise(noise)),
+                None => mean,
+            };
+            means.push(mean.map_err(|problem| whole.integrate(problem.into()))?);
         }
         Ok(())
     })?;
+    let made = stack(&*method, &means).map_err(problem)?;
+    let images: Vec<Image> =
+        made.into_iter().map(|made| whole.source.flattened(made.image)).collect();
     let header = format!("{}, {frames} frames", whole.path.display());
     let bytes = video(&header, &images, Unit::AdcCounts, provenance);
     write_result(out, existing, &bytes)?;
@@ -85,7 +88,8 @@ mod tests {
     /// The means of frames whose values are 0, 1, 2, ... and ten times that.
     fn means(frames: u32, most: usize) -> Vec<Vec<f64>> {
         let mut groups = Groups::new(frames as usize, most);
-        (0..frames).map(f64::from).filter_map(|k| groups.add(&[k, 10.0 * k])).collect()
+        let add = |k| groups.add(&[k, 10.0 * k]).map(|(mean, _)| mean);
+        (0..frames).map(f64::from).filter_map(add).collect()
     }
 
     #[test]

@@ -174,16 +174,34 @@ impl Enhance {
         white: White,
         context: &ImageContext<'_>,
     ) -> Result<EnhancedImage, EnhanceError> {
-        let side = image.side().pixels();
+        Ok(self.enhance_all(&[image], white.level(image), context)?.remove(0))
+    }
+
+    /// Enhances images of one size, of one white level, made of readings of the same rows; a map of
+    /// distances for each, if there are any. The networks work on many at once.
+    ///
+    /// # Errors
+    /// As [`enhance`](Self::enhance), of the first image that is refused.
+    ///
+    /// # Panics
+    /// If the images differ in size.
+    pub fn enhance_all(
+        &self,
+        images: &[&Image],
+        white: f32,
+        context: &ImageContext<'_>,
+    ) -> Result<Vec<EnhancedImage>, EnhanceError> {
+        let Some(first) = images.first() else { return Ok(Vec::new()) };
+        let side = first.side().pixels();
+        assert!(images.iter().all(|image| image.side() == first.side()), "images of one size");
         if side != fusion::SIDE && side != deblur::SIDE {
             return Err(EnhanceError::Side { found: side });
         }
-        let white = white.level(image);
         if !(white > 0.0 && white.is_finite()) {
             return Err(EnhanceError::Dark { white });
         }
-        let scaled: Vec<f32> =
-            image.pixels().iter().map(|&value| (value / white).clamp(0.0, 1.0)).collect();
+        let pixels = images.iter().flat_map(|image| image.pixels());
+        let scaled: Vec<f32> = pixels.map(|&value| (value / white).clamp(0.0, 1.0)).collect();
         // An image of 64 x 64 was not measured by patterns of 32 x 32.
         let measured = match context.rows {
             Some(rows) if side == fusion::SIDE => MeasuredRows::new(side, rows)?,
@@ -198,16 +216,27 @@ impl Enhance {
             estimate: KnownEstimate { sigma_px, ..KnownEstimate::default() },
             ..Options::default()
         };
-        let result = if side == fusion::SIDE {
+        let results = if side == fusion::SIDE {
             self.both.enhance(Images::new(&scaled)?, context.depth, &options, &mut |_| {})?
         } else {
             self.second.deblur(Images::new(&scaled)?, &options, &mut |_| {})?
         };
+        let each = results.each().zip(scaled.chunks_exact(side * side));
+        Ok(each.map(|(result, scaled)| self.made(result, scaled, white, context)).collect())
+    }
+
+    fn made(
+        &self,
+        result: nirspi_nets::Enhanced,
+        scaled: &[f32],
+        white: f32,
+        context: &ImageContext<'_>,
+    ) -> EnhancedImage {
         let used = result.estimates[0];
         let half_width = self.half_width(&result, white, context);
         let estimated = result.estimated.as_ref().map_or(used, |estimated| estimated[0]);
-        Ok(EnhancedImage {
-            scaled,
+        EnhancedImage {
+            scaled: scaled.to_vec(),
             white,
             fused: result.upscaled,
             pixels: result.images,
@@ -218,7 +247,7 @@ impl Enhance {
             spread: result.spread,
             no_interval: half_width.as_ref().err().cloned(),
             half_width: half_width.ok(),
-        })
+        }
     }
 
     /// The half-widths of the intervals, or why there are none.

@@ -37,6 +37,12 @@ impl FrameReport {
         }
     }
 
+    /// Whether there is a reason not to trust the result.
+    #[must_use]
+    pub fn warns(&self) -> bool {
+        !self.warnings.is_empty()
+    }
+
     /// One line for the user.
     #[must_use]
     pub fn line(&self) -> String {
@@ -46,6 +52,9 @@ impl FrameReport {
         )
     }
 }
+
+/// Images that are enhanced at a time: enough for the networks, few enough for the memory.
+const AT_A_TIME: usize = 256;
 
 /// Why frames are not enhanced.
 #[derive(Debug, Error)]
@@ -109,10 +118,15 @@ pub fn enhance_frames_by(
     let white = White::Brightest.median_level(frames.iter().map(|(image, _)| *image));
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     times.time("enhance", || -> Result<(), FramesError> {
-        for (image, rows) in frames {
-            let (mut made, warnings) = enhance_frame(enhance, image, rows, white, None)?;
-            reports.push(FrameReport::of(&made, &warnings));
-            pixels.append(&mut made.pixels);
+        let like =
+            |a: &(&Image, &Rows), b: &(&Image, &Rows)| a.1 == b.1 && a.0.side() == b.0.side();
+        for alike in frames.chunk_by(like).flat_map(|alike| alike.chunks(AT_A_TIME)) {
+            let images: Vec<&Image> = alike.iter().map(|(image, _)| *image).collect();
+            let context = ImageContext { rows: Some(alike[0].1), ..ImageContext::default() };
+            for mut made in enhance.enhance_all(&images, white, &context)? {
+                reports.push(FrameReport::of(&made, &warnings(&made)));
+                pixels.append(&mut made.pixels);
+            }
         }
         Ok(())
     })?;

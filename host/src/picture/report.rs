@@ -152,10 +152,11 @@ impl Pictures {
         self.many(file, sheet, sheet.shown().len(), bytes);
     }
 
-    /// Draws a contact sheet, `NAME.png`, and the same images as a video, `NAME.apng`.
+    /// Draws a contact sheet, `NAME.png`, and the same images as a video, `NAME.apng`: 100 of them at most,
+    /// evenly chosen.
     pub fn sheet_and_video(&mut self, name: &str, sheet: &Sheet<'_>) {
         self.sheet(&format!("{name}.png"), sheet);
-        let video = video::encode(sheet, &self.provenance);
+        let video = video::beside(sheet, &self.provenance);
         self.many(&format!("{name}.apng"), sheet, video.frames, video.bytes);
     }
 

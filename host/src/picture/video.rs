@@ -12,9 +12,14 @@ use crate::files::image::sign;
 use crate::provenance::Provenance;
 use image::{GenericImageView, RgbImage, imageops};
 use nirspi_recon::Image;
+use rayon::prelude::*;
 
-/// The most frames.
+/// The most frames of a video that is made for itself.
 const MOST: usize = 1000;
+/// The most frames of a video beside other results, which it must not delay.
+const MOST_BESIDE: usize = 100;
+/// Frames that are drawn at a time, on all processors.
+const TOGETHER: usize = 64;
 /// Frames a second.
 const RATE_HZ: u16 = 10;
 
@@ -24,23 +29,29 @@ pub(super) struct Video {
     pub(super) frames: usize,
 }
 
-/// The images of a sheet, one after another, on the sheet's scale.
+/// Some images of a sheet, one after another, on the sheet's scale: a video to look at beside the results.
 ///
 /// # Panics
 /// If there is no image.
-pub(super) fn encode(sheet: &Sheet<'_>, provenance: &Provenance) -> Video {
-    let shown = evenly(sheet.count(), MOST);
+pub(super) fn beside(sheet: &Sheet<'_>, provenance: &Provenance) -> Video {
+    encode(sheet, MOST_BESIDE, provenance)
+}
+
+fn encode(sheet: &Sheet<'_>, most: usize, provenance: &Provenance) -> Video {
+    let shown = evenly(sheet.count(), most);
     let pictures: Vec<SideBySide> = shown.iter().map(|&index| frame(sheet, index)).collect();
     // The text below an image may be longer than that of another.
     let height = pictures.iter().map(SideBySide::height).max().unwrap_or(1);
     let mut bytes = Vec::new();
     let encoded = (|| {
         let drawn = |picture: &SideBySide| signed(&padded(picture.render(), height), provenance);
-        let mut pictures = pictures.iter().map(drawn);
+        let together = |some: &[SideBySide]| some.par_iter().map(drawn).collect::<Vec<_>>();
+        let mut pictures = pictures.chunks(TOGETHER).flat_map(together);
         let mut before = pictures.next().unwrap_or_else(|| RgbImage::new(1, 1));
         let mut encoder = png::Encoder::new(&mut bytes, before.width(), before.height());
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Fast);
         encoder.set_animated(shown.len() as u32, 0)?;
         encoder.set_frame_delay(1, RATE_HZ)?;
         sign(&mut encoder, provenance)?;
@@ -68,7 +79,7 @@ pub(super) fn encode(sheet: &Sheet<'_>, provenance: &Provenance) -> Video {
 pub fn of_images(header: &str, images: &[Image], unit: Unit, provenance: &Provenance) -> Vec<u8> {
     let side = images.first().map_or(1, |image| image.side().pixels());
     let values = images.iter().map(Image::pixels).collect();
-    encode(&Sheet::new(header.to_owned(), side, values, unit), provenance).bytes
+    encode(&Sheet::new(header.to_owned(), side, values, unit), MOST, provenance).bytes
 }
 
 fn frame(sheet: &Sheet<'_>, index: usize) -> SideBySide {
@@ -128,7 +139,7 @@ mod tests {
             .collect();
         let images: Vec<&[f32]> = images.iter().map(Vec::as_slice).collect();
         let sheet = Sheet::new(String::new(), 8, images, Unit::AdcCounts);
-        let video = encode(&sheet, &provenance());
+        let video = encode(&sheet, MOST, &provenance());
         assert_eq!(video.frames, 4);
         let frames = PngDecoder::new(Cursor::new(&video.bytes)).unwrap().apng().unwrap();
         let frames = frames.into_frames().collect_frames().unwrap();
@@ -146,6 +157,8 @@ mod tests {
     #[test]
     fn a_video_of_very_many_images_says_how_many_it_leaves_out() {
         assert_eq!(evenly(20_000, MOST).len(), 1000);
+        let many = Sheet::new(String::new(), 2, vec![&[0.0; 4]; 101], Unit::AdcCounts);
+        assert_eq!(beside(&many, &provenance()).frames, 100);
         let one = vec![0.0; 4];
         let sheet = Sheet::new(String::new(), 2, vec![&one; 1234], Unit::AdcCounts);
         assert_eq!(frame(&sheet, 17).panels[0].title, "frame 17, of 0 to 1233");

@@ -154,11 +154,25 @@ fn images_of(
         true => vec![Source::read(file, options)?],
         false => Source::read_all(file, options)?,
     };
+    Ok(file_images(file, sources, solver, false)?)
+}
+
+/// The images of all measurements of one file, in their order. In a video, each frame starts from the
+/// frames before.
+///
+/// # Errors
+/// [`SolverError`] names the file and the problem.
+pub fn file_images(
+    file: &Path,
+    sources: Vec<Source>,
+    solver: &Solver,
+    is_video: bool,
+) -> Result<Vec<FileImage>, SolverError> {
     let several = sources.len() > 1;
-    let image = |(index, source): (usize, Source)| -> Result<FileImage, NoImage> {
-        let Solved { image, with_readings, parts, used, order, report } =
-            solver.solve(file, &source)?;
-        Ok(FileImage {
+    let made = solver.solve_all(file, &sources, is_video)?;
+    let image = |(index, (source, solved)): (usize, (Source, Solved))| {
+        let Solved { image, with_readings, parts, used, order, report } = solved;
+        FileImage {
             file: file.to_owned(),
             index: several.then_some(index),
             image,
@@ -173,9 +187,9 @@ fn images_of(
             // The frames of one recording lack the same.
             warnings: if index == 0 { source.all_warnings() } else { source.warnings },
             taken: source.taken,
-        })
+        }
     };
-    sources.into_iter().enumerate().map(image).collect()
+    Ok(sources.into_iter().zip(made).enumerate().map(image).collect())
 }
 
 /// The readings that a measurement lacks, in words.

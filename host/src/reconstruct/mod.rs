@@ -5,10 +5,14 @@ mod many;
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 mod one;
 mod solver;
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+mod stack;
 
-pub use many::{FileImage, ManyImages, Skipped, losses, many_images};
+pub use many::{FileImage, ManyImages, Skipped, file_images, losses, many_images};
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 pub use one::{DropoutReport, OneError, OneImage, OneReport, one_image, write_image};
 pub use solver::{
     Recipe, Solved, Solver, SolverError, check_finite, not_read_words, own_atoms, read_atoms,
 };
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+pub use stack::{ImageReport, StackFolder, StackFolderError, StackReport, write_stack};

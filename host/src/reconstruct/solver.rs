@@ -4,10 +4,10 @@ use crate::files::{FileError, npy};
 use crate::imaging::MethodReport;
 use crate::source::{FirstPatterns, Source};
 use nirspi_recon::reconstruct::{
-    Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction,
+    Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction, stack,
 };
 use nirspi_recon::words::count_of;
-use nirspi_recon::{Image, MeasurementError, Measurements, Sampling};
+use nirspi_recon::{Image, MeasurementError, Measurements, Rows, Sampling, ShorterSweep};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -127,8 +127,20 @@ impl Solver {
         Ok(ready)
     }
 
-    fn solve_one(&self, measurements: &Measurements) -> Result<Reconstruction, SolverError> {
-        let made = self.prepared(measurements.side().pixels())?.reconstruct(measurements);
+    /// The images of measurements of one side: of [one kind](stack), or a video in which each frame starts
+    /// from the frames before.
+    fn images(
+        &self,
+        measurements: &[Measurements],
+        is_video: bool,
+    ) -> Result<Vec<Reconstruction>, SolverError> {
+        let Some(first) = measurements.first() else { return Ok(Vec::new()) };
+        let method = self.prepared(first.side().pixels())?;
+        let made = match (is_video, measurements) {
+            (true, _) => method.reconstruct_video(measurements),
+            (false, [one]) => method.reconstruct(one).map(|made| vec![made]),
+            (false, _) => stack(&*method, measurements),
+        };
         match &self.recipe.dictionary {
             Some(path) => {
                 made.map_err(|problem| SolverError::WithAtoms { path: path.clone(), problem })
@@ -142,28 +154,59 @@ impl Solver {
     /// # Errors
     /// [`SolverError`] names the file and the problem.
     pub fn solve(&self, path: &Path, source: &Source) -> Result<Solved, SolverError> {
+        Ok(self.solve_all(path, std::slice::from_ref(source), false)?.remove(0))
+    }
+
+    /// The images of all measurements that were read from `path`, in their order. What is the same for
+    /// measurements of [one kind](stack) is found out once. In a video, each frame starts from the
+    /// frames before.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_all(
+        &self,
+        path: &Path,
+        sources: &[Source],
+        is_video: bool,
+    ) -> Result<Vec<Solved>, SolverError> {
         let Recipe { method, first, sampling, .. } = &self.recipe;
-        let take = |measurements| {
-            first
-                .take(measurements, sampling.share())
-                .map_err(|problem| SolverError::Measurements { path: path.to_owned(), problem })
+        let wrong = |problem| SolverError::Measurements { path: path.to_owned(), problem };
+        // Most measurements of a file have the same rows.
+        let mut last: Option<(Rows, (ShorterSweep, String))> = None;
+        let mut take = |measurements: &Measurements| {
+            let rows = measurements.rows();
+            let (sweep, order) = match last.take_if(|(of, _)| of == rows) {
+                Some((_, taken)) => taken,
+                None => first.among(rows, sampling.share()).map_err(wrong)?,
+            };
+            let taken = (sweep.of(measurements), order.clone());
+            last = Some((rows.clone(), (sweep, order)));
+            Ok::<_, SolverError>(taken)
         };
-        let (used, order) = take(&source.measurements)?;
-        let made = self.solve_one(&used)?;
-        let with_readings = source.flattened(made.with_readings(&used));
-        let Reconstruction { image, report: made } = made;
-        let parts = match &source.imaginary {
-            None => None,
-            Some(imaginary) => Some([image.clone(), self.solve_one(&take(imaginary)?.0)?.image]),
-        };
-        let image = match &parts {
-            None => image,
-            Some([real, imaginary]) => Image::magnitude(real, imaginary),
-        };
-        check_finite(path, &image)?;
-        let image = source.flattened(image);
-        let report = MethodReport { method: *method, made };
-        Ok(Solved { image, with_readings, parts, used, order, report })
+        let taken: Vec<(Measurements, String)> =
+            sources.iter().map(|source| take(&source.measurements)).collect::<Result<_, _>>()?;
+        let (used, orders): (Vec<Measurements>, Vec<String>) = taken.into_iter().unzip();
+        // Imaginary parts of complex readings: all measurements of a file have one, or none has.
+        let imaginary = sources.iter().filter_map(|source| source.imaginary.as_ref());
+        let imaginary: Vec<Measurements> =
+            imaginary.map(|part| Ok(take(part)?.0)).collect::<Result<_, SolverError>>()?;
+        let mut others = self.images(&imaginary, is_video)?.into_iter();
+        let made = self.images(&used, is_video)?;
+        let all = made.into_iter().zip(used).zip(orders).zip(sources);
+        all.map(|(((made, used), order), source)| {
+            let with_readings = source.flattened(made.with_readings(&used));
+            let Reconstruction { image, report: made } = made;
+            let parts = others.next().map(|other| [image.clone(), other.image]);
+            let image = match &parts {
+                None => image,
+                Some([real, imaginary]) => Image::magnitude(real, imaginary),
+            };
+            check_finite(path, &image)?;
+            let image = source.flattened(image);
+            let report = MethodReport { method: *method, made };
+            Ok(Solved { image, with_readings, parts, used, order, report })
+        })
+        .collect()
     }
 }
 

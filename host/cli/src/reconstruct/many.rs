@@ -1,16 +1,14 @@
 //! `nirspi reconstruct FILE FILE ...` and `nirspi reconstruct DIR`: the images of many files, as one
 //! stack.
 
-use super::stack::{FrameReport, Made, Report, write};
+use super::stack::write;
 use super::{Args, print};
 use crate::Usage;
 use crate::progress::Progress;
-use crate::provenance::made;
 use crate::report::stages;
 use anyhow::{Result, bail};
 use nirspi::files::folder::measurement_files;
-use nirspi::picture::Unit;
-use nirspi::reconstruct::{FileImage, ManyImages, many_images};
+use nirspi::reconstruct::{StackReport, many_images};
 use nirspi::source::FirstPatterns;
 use nirspi_recon::words::count_of;
 use std::path::{Path, PathBuf};
@@ -29,53 +27,18 @@ pub fn run(args: &Args, first: FirstPatterns) -> Result<ExitCode> {
     let bar = Progress::of("reconstructing", files.len(), "files");
     let many = times.time("reconstruct", || many_images(&files, &options, &solver, &|| bar.add(1)));
     drop(bar);
-    let provenance = many.taken(&args.source.input).made(made());
-    let ManyImages { images, skipped } = many;
-    if args.enhance && images.iter().any(|image| image.complex) {
-        let needed = "--enhance needs real images: choose --part real or --part imaginary";
-        return Err(Usage(needed.to_owned()).into());
-    }
-    let Some(one) = images.first() else {
-        let reason = skipped.first().map(|skipped| skipped.reason.as_str()).unwrap_or_default();
+    if many.images.is_empty() {
+        let reason = many.skipped.first().map(|skipped| skipped.reason.as_str());
+        let reason = reason.unwrap_or_default();
         bail!("none of {} gave an image; the first: {reason}", count_of(files.len(), "file"));
-    };
-    let (order, unit) = (one.order.clone(), Unit::of_readings(one.recorded));
-    // All images of a file have one white level, and files have their own.
-    let stretches: Vec<usize> =
-        images.chunk_by(|a, b| a.file == b.file).map(<[FileImage]>::len).collect();
-    let (mut pictures, mut given, mut frames) = (Vec::new(), Vec::new(), Vec::new());
-    for made in images {
-        pictures.push(made.image);
-        given.push((made.with_readings, made.used));
-        frames.push(FrameReport {
-            file: Some(made.file),
-            index: made.index,
-            used: given.last().map_or(0, |(_, rows)| rows.len()),
-            warm: false,
-            method: made.report,
-            enhancement: None,
-            outliers: made.outliers,
-            warnings: made.warnings,
-            notes: made.notes,
-        });
     }
     let named = match &named[..] {
         [folder] => folder.display().to_string(),
         all => count_of(all.len(), "name"),
     };
-    let made = Made {
-        named,
-        images: pictures,
-        stretches,
-        given,
-        unit,
-        provenance,
-        order,
-        frames,
-        skipped,
-    };
-    let (report, provenance) = write(args, made, times)?;
-    let code = args.report.print(&report, &provenance, |report| say(args, &files, report))?;
+    let report = write(args, many, named, true, times)?;
+    let provenance = report.pictures.provenance();
+    let code = args.report.print(&report, provenance, |report| say(args, &files, report))?;
     if report.skipped.is_empty() {
         return Ok(code);
     }
@@ -84,7 +47,7 @@ pub fn run(args: &Args, first: FirstPatterns) -> Result<ExitCode> {
     Ok(ExitCode::FAILURE)
 }
 
-fn say(args: &Args, files: &[PathBuf], report: &Report) -> Result<()> {
+fn say(args: &Args, files: &[PathBuf], report: &StackReport) -> Result<()> {
     for skipped in &report.skipped {
         print::note(format_args!("skipped: {}", skipped.reason))?;
     }

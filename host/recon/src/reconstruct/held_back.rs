@@ -61,6 +61,17 @@ impl HeldBack {
         })
     }
 
+    /// The mean of several judgements; `None` if there is none.
+    pub(super) fn mean(all: &[Self]) -> Option<Self> {
+        let of = |part: fn(&Self) -> f64| all.iter().map(part).sum::<f64>() / all.len() as f64;
+        let mean = || Self {
+            miss: of(|h| h.miss),
+            confirmed: of(|h| h.confirmed),
+            score: of(|h| h.score),
+        };
+        (!all.is_empty()).then(mean)
+    }
+
     /// Whether the readings are predicted no better than readings of other patterns would be.
     #[must_use]
     pub fn is_by_chance(&self) -> bool {

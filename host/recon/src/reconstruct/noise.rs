@@ -19,6 +19,7 @@
 //! Quadrature*, 2010; stochastic Lanczos quadrature).
 
 use crate::basis::{Basis, Transform};
+use crate::measurements::Kind;
 use crate::{Measurements, Rows, fwht, order};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
@@ -57,14 +58,19 @@ const RATIOS: (i32, i32, i32) = (-6, 2, 4);
 /// fewer. With fewer than 32 rows it is 0.
 #[must_use]
 pub fn estimated_noise(measurements: &Measurements) -> f64 {
-    measurements.noise().unwrap_or_else(|| {
-        let largest = measurements.values().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        if largest == 0.0 {
-            return 0.0;
-        }
-        let values: Vec<f32> = measurements.values().iter().map(|v| (v / largest) as f32).collect();
-        f64::from(Statistics::of(measurements.rows(), &values).noise) * largest
-    })
+    let known = measurements.noise().or(measurements.kind().map(|kind| kind.noise));
+    known.unwrap_or_else(|| estimated(measurements).noise)
+}
+
+/// What one measurement says of itself.
+pub(super) fn estimated(measurements: &Measurements) -> Kind {
+    let largest = measurements.values().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    if largest == 0.0 {
+        return Kind { noise: 0.0, falloff: 1.0 };
+    }
+    let values: Vec<f32> = measurements.values().iter().map(|v| (v / largest) as f32).collect();
+    let Statistics { noise, falloff } = Statistics::of(measurements.rows(), &values);
+    Kind { noise: f64::from(noise) * largest, falloff }
 }
 
 /// What readings say of their noise and of the scene.

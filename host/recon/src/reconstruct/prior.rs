@@ -19,8 +19,10 @@
 //! so (`tests::what_the_network_cannot_complete_is_tikhonov_and_says_so`). A side that the network
 //! does not complete is an error (`tests::a_side_that_the_network_does_not_take_is_an_error`).
 
+mod kind;
 mod seen;
 
+pub(super) use kind::network_kind;
 pub use seen::Seen;
 
 use super::selection::Line;
@@ -111,13 +113,7 @@ pub fn with_network(
         Err(why) => return classical(measurements, name, &why),
     };
     let complete = |seen: &Seen| network.complete(seen).map_err(ReconstructError::Failed);
-    let trust = match held_back(measurements) {
-        None => 1.0,
-        Some((kept, held)) => match Seen::new(&measurements.subset(kept)) {
-            None => 0.0,
-            Some(part) => trust(&part, &complete(&part)?, measurements, &held),
-        },
-    };
+    let trust = support(measurements, complete)?;
     if trust < LEAST_TRUST {
         let why = "held-back measurements do not support the network";
         return classical(measurements, name, why);
@@ -136,6 +132,20 @@ pub fn with_network(
     report.noise = Some(noise);
     report.residual = Some(seen.residual(&grid));
     Ok(Reconstruction { image: image(&seen, grid), report })
+}
+
+/// The trust in the network's completion that held-back measurements support.
+fn support(
+    measurements: &Measurements,
+    complete: impl Fn(&Seen) -> Result<Vec<f32>, ReconstructError>,
+) -> Result<f32, ReconstructError> {
+    Ok(match held_back(measurements) {
+        None => 1.0,
+        Some((kept, held)) => match Seen::new(&measurements.subset(kept)) {
+            None => 0.0,
+            Some(part) => trust(&part, &complete(&part)?, measurements, &held),
+        },
+    })
 }
 
 /// Goes from the start to the completion as far as the completion is believed.

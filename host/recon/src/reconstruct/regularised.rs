@@ -112,7 +112,37 @@ impl RegularisedSettings {
         }
     }
 
-    fn check(&self) -> Result<(), ReconstructError> {
+    pub(super) fn problem<'m>(&self, measurements: &'m Measurements) -> Problem<'m> {
+        Problem::of(measurements, self.basis, self.falloff, self.noise)
+    }
+
+    /// What the measurements at some positions predict of all rows, for each strength.
+    pub(super) fn predict(
+        &self,
+        problem: &Problem<'_>,
+        positions: &[usize],
+        strengths: &[f32],
+    ) -> Vec<Vec<f32>> {
+        let predict = match self.penalty {
+            Penalty::Tikhonov => tikhonov::predict,
+            Penalty::Sparse => fista::predict,
+            Penalty::TotalVariation => total_variation::predict,
+        };
+        predict(problem, positions, strengths, self.iterations)
+    }
+
+    /// The rows that limit the trust in a prediction. Total variation draws edges into plain noise, so it
+    /// gets the lowest limit. A limit on the sparse penalty helps nowhere and costs 0.001 of correlation
+    /// on real measurements (scatter_tests.rs).
+    pub(super) fn trusted(&self) -> Trusted {
+        match self.penalty {
+            Penalty::TotalVariation => Trusted::AsFarAsFine { standard_errors: 0.0 },
+            Penalty::Tikhonov => Trusted::AsFarAsFine { standard_errors: 1.0 },
+            Penalty::Sparse => Trusted::ByAll,
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), ReconstructError> {
         self.strength.check()?;
         if self.iterations == 0 {
             let (setting, expected) = ("iterations", "1 or more");
@@ -144,7 +174,7 @@ pub struct Regularised {
 }
 
 /// Strengths to try, the strongest first. Each starts from the result of the one before.
-const STRENGTHS: [f32; 5] = [10.0, 3.0, 1.0, 0.3, 0.1];
+pub(super) const STRENGTHS: [f32; 5] = [10.0, 3.0, 1.0, 0.3, 0.1];
 
 /// Reconstructs an image from partial measurements with a penalty.
 ///
@@ -155,29 +185,17 @@ pub fn regularised(
     settings: &RegularisedSettings,
 ) -> Result<Regularised, ReconstructError> {
     settings.check()?;
-    let problem = Problem::of(measurements, settings.basis, settings.falloff, settings.noise);
-    let predict = |positions: &[usize], strengths: &[f32]| match settings.penalty {
-        Penalty::Tikhonov => tikhonov::predict(&problem, positions, strengths, settings.iterations),
-        Penalty::Sparse => fista::predict(&problem, positions, strengths, settings.iterations),
-        Penalty::TotalVariation => {
-            total_variation::predict(&problem, positions, strengths, settings.iterations)
-        }
-    };
+    let problem = settings.problem(measurements);
     let (at, trust, strengths, held_back) = match settings.strength {
         Strength::Fixed(strength) => (0, 1.0, vec![strength as f32], None),
         Strength::CrossValidated { folds } => {
-            // Total variation draws edges into plain noise, so it gets the lowest limit. A limit on
-            // the sparse penalty helps nowhere and costs 0.001 of correlation on real
-            // measurements (scatter_tests.rs).
-            let trusted = match settings.penalty {
-                Penalty::TotalVariation => Trusted::AsFarAsFine { standard_errors: 0.0 },
-                Penalty::Tikhonov => Trusted::AsFarAsFine { standard_errors: 1.0 },
-                Penalty::Sparse => Trusted::ByAll,
-            };
-            let choice =
-                selection::choose_among(&problem, STRENGTHS.len(), folds, trusted, |kept| {
-                    Ok(predict(kept, &STRENGTHS))
-                })?;
+            let choice = selection::choose_among(
+                &problem,
+                STRENGTHS.len(),
+                folds,
+                settings.trusted(),
+                |kept| Ok(settings.predict(&problem, kept, &STRENGTHS)),
+            )?;
             match choice {
                 None => (0, TRUST[0], STRENGTHS[..1].to_vec(), None),
                 Some(Chosen { at, trust, held_back }) => {
@@ -187,7 +205,7 @@ pub fn regularised(
         }
     };
     let every: Vec<usize> = (0..problem.rows.len()).collect();
-    let mut predictions = predict(&every, &strengths);
+    let mut predictions = settings.predict(&problem, &every, &strengths);
     let predicted = predictions.swap_remove(at);
     let judged = problem.judge(held_back.as_deref(), trust);
     let made = Made::weighted(&problem, predicted, trust, held_back.as_deref());

@@ -140,6 +140,10 @@ pub(super) enum Trusted {
     AsFarAsFine { standard_errors: f64 },
 }
 
+/// The rows that limit the trust in a pursuit. A lower limit loses up to 0.4 dB on real measurements, a
+/// higher one loses to zero filling in scattered light (scatter_tests.rs).
+pub(super) const OMP_TRUSTED: Trusted = Trusted::AsFarAsFine { standard_errors: 3.0 };
+
 /// The misses of one fold, and what each candidate predicts for its measurements.
 type Fold = (Misses, Vec<Vec<f32>>);
 
@@ -151,11 +155,53 @@ type Misses = Vec<([Miss; TRUST.len()], Line)>;
 /// each relative to zero filling's: with squares alone the few large coefficients would decide,
 /// with absolute values alone the many small ones.
 pub(super) fn choose(problem: &Problem, most: usize, folds: usize) -> Result<Choice, OmpError> {
-    choose_sparsity(problem, most, folds, |kept, sparsities| {
-        let dictionary = problem.dictionary(kept);
-        let found = problem.pursue(&dictionary, kept, sparsities)?;
-        Ok(found.iter().map(|f| dictionary.predict(&f.support, &f.coefficients)).collect())
-    })
+    choose_sparsity(problem, most, folds, |kept, sparsities| predict(problem, kept, sparsities))
+}
+
+/// One choice for several problems.
+pub(super) struct Together {
+    /// Index of the candidate.
+    pub at: usize,
+    /// Trust: factor on the prediction for rows that were not measured.
+    pub trust: f32,
+    /// What the candidate predicts for each problem's measurements without them.
+    pub held_back: Vec<Vec<f32>>,
+}
+
+/// As [`choose_among`], one choice for several problems of one kind, by what all of them miss.
+pub(super) fn choose_together(
+    problems: &[Problem<'_>],
+    count: usize,
+    folds: usize,
+    trusted: Trusted,
+    predict: impl Fn(&Problem<'_>, &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+) -> Result<Option<Together>, OmpError> {
+    let folded: Result<Option<Vec<Folded>>, OmpError> = problems
+        .par_iter()
+        .map(|problem| Folded::new(problem, folds, |kept| predict(problem, kept)))
+        .collect();
+    let Some(folded) = folded? else { return Ok(None) };
+    let mut total: Misses = vec![Default::default(); count];
+    folded.iter().for_each(|folded| add(&mut total, &folded.total(count)));
+    let (at, trust) = best(&total, trusted);
+    let held_back = folded.iter().zip(problems).map(|(folded, of)| folded.held_back(of, at));
+    Ok(Some(Together { at, trust, held_back: held_back.collect() }))
+}
+
+/// The numbers of atoms to try for so many measurements.
+pub(super) fn sparsities(measurements: usize, most: usize) -> Vec<usize> {
+    geometric(most.min(measurements / 4).max(1))
+}
+
+/// What a pursuit predicts of all rows, from the measurements at some positions.
+pub(super) fn predict(
+    problem: &Problem<'_>,
+    kept: &[usize],
+    sparsities: &[usize],
+) -> Result<Vec<Vec<f32>>, OmpError> {
+    let dictionary = problem.dictionary(kept);
+    let found = problem.pursue(&dictionary, kept, sparsities)?;
+    Ok(found.iter().map(|f| dictionary.predict(&f.support, &f.coefficients)).collect())
 }
 
 /// [`choose`] for any dictionary. `predict` makes the prediction for each number of atoms, from the
@@ -166,16 +212,12 @@ pub(super) fn choose_sparsity(
     folds: usize,
     predict: impl Fn(&[usize], &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Choice, OmpError> {
-    let count = problem.rows.len();
-    let largest = most.min(count / 4).max(1);
-    let sparsities = geometric(largest);
-    // A lower limit loses up to 0.4 dB on real measurements, a higher one loses to zero filling in
-    // scattered light (scatter_tests.rs).
-    let trusted = Trusted::AsFarAsFine { standard_errors: 3.0 };
-    let found =
-        choose_among(problem, sparsities.len(), folds, trusted, |kept| predict(kept, &sparsities))?;
+    let sparsities = sparsities(problem.rows.len(), most);
+    let found = choose_among(problem, sparsities.len(), folds, OMP_TRUSTED, |kept| {
+        predict(kept, &sparsities)
+    })?;
     Ok(match found {
-        None => Choice { atoms: largest, trust: 0.0, held_back: None },
+        None => Choice { atoms: sparsities[sparsities.len() - 1], trust: 0.0, held_back: None },
         Some(Chosen { at, trust, held_back }) => {
             Choice { atoms: sparsities[at], trust, held_back: Some(held_back) }
         }
@@ -192,30 +234,71 @@ pub(super) fn choose_among(
     trusted: Trusted,
     predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<Chosen>, OmpError> {
-    let parts = parts(problem.rows, folds);
-    if parts.is_empty() {
-        return Ok(None);
-    }
-    let fine = finer_half(problem.rows);
-    let results: Result<Vec<Fold>, OmpError> = parts
-        .par_iter()
-        .map(|(kept, held)| {
-            let predictions = predict(kept)?;
-            let misses = misses_of(problem, &predictions, held, &fine);
-            let of_held = |predicted: &Vec<f32>| {
-                held.iter().map(|&k| predicted[problem.rows[k] as usize]).collect()
-            };
-            Ok((misses, predictions.iter().map(of_held).collect()))
-        })
-        .collect();
-    let results = results?;
-    let mut total: Misses = vec![Default::default(); count];
-    for (misses, _) in &results {
-        for ((total, total_fine), (misses, fine)) in total.iter_mut().zip(misses) {
-            total.iter_mut().zip(misses).for_each(|(total, miss)| total.add(*miss));
-            total_fine.join(*fine);
+    let Some(folded) = Folded::new(problem, folds, predict)? else { return Ok(None) };
+    let (at, trust) = best(&folded.total(count), trusted);
+    Ok(Some(Chosen { at, trust, held_back: folded.held_back(problem, at) }))
+}
+
+/// What each candidate predicts of the measurements that are held back in turn.
+struct Folded {
+    parts: Vec<(Vec<usize>, Vec<usize>)>,
+    results: Vec<Fold>,
+}
+
+impl Folded {
+    /// `None` if there is nothing to hold back.
+    fn new(
+        problem: &Problem<'_>,
+        folds: usize,
+        predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+    ) -> Result<Option<Self>, OmpError> {
+        let parts = parts(problem.rows, folds);
+        if parts.is_empty() {
+            return Ok(None);
         }
+        let fine = finer_half(problem.rows);
+        let results: Result<Vec<Fold>, OmpError> = parts
+            .par_iter()
+            .map(|(kept, held)| {
+                let predictions = predict(kept)?;
+                let misses = misses_of(problem, &predictions, held, &fine);
+                let of_held = |predicted: &Vec<f32>| {
+                    held.iter().map(|&k| predicted[problem.rows[k] as usize]).collect()
+                };
+                Ok((misses, predictions.iter().map(of_held).collect()))
+            })
+            .collect();
+        Ok(Some(Self { parts, results: results? }))
     }
+
+    /// The misses of `count` candidates.
+    fn total(&self, count: usize) -> Misses {
+        let mut total: Misses = vec![Default::default(); count];
+        self.results.iter().for_each(|(misses, _)| add(&mut total, misses));
+        total
+    }
+
+    /// What a candidate predicts for each measurement without it.
+    fn held_back(&self, problem: &Problem<'_>, at: usize) -> Vec<f32> {
+        let mut held_back = problem.values.clone();
+        for ((_, held), (_, predictions)) in self.parts.iter().zip(&self.results) {
+            for (&k, &predicted) in held.iter().zip(&predictions[at]) {
+                held_back[k] = predicted;
+            }
+        }
+        held_back
+    }
+}
+
+fn add(total: &mut Misses, misses: &Misses) {
+    for ((total, total_fine), (misses, fine)) in total.iter_mut().zip(misses) {
+        total.iter_mut().zip(misses).for_each(|(total, miss)| total.add(*miss));
+        total_fine.join(*fine);
+    }
+}
+
+/// The candidate with the least miss, and the trust in it.
+fn best(total: &Misses, trusted: Trusted) -> (usize, f32) {
     let zero_filling = total[0].0[0];
     let mut best = ((0, 0.0), 2.0);
     for (at, (misses, _)) in total.iter().enumerate() {
@@ -231,13 +314,7 @@ pub(super) fn choose_among(
         Trusted::ByAll => 1.0,
         Trusted::AsFarAsFine { standard_errors } => total[at].1.most_trust(standard_errors) as f32,
     };
-    let mut held_back = problem.values.clone();
-    for ((_, held), (_, predictions)) in parts.iter().zip(&results) {
-        for (&k, &predicted) in held.iter().zip(&predictions[at]) {
-            held_back[k] = predicted;
-        }
-    }
-    Ok(Some(Chosen { at, trust: trust.min(limit), held_back }))
+    (at, trust.min(limit))
 }
 
 /// The miss of each prediction with each trust, on the held-back measurements.

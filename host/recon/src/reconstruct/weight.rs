@@ -41,37 +41,174 @@ pub(super) fn weigh_each(
     reading: impl Fn(usize) -> (f32, f32),
     grid: &mut [f32],
 ) -> f64 {
-    let positions = order::positions_by_sequency(rows);
-    let bands = (positions.len() / LEAST_OF_A_BAND).clamp(1, MOST_BANDS);
-    let mut weights = 0.0;
-    for band in positions.chunks(positions.len().div_ceil(bands).max(1)) {
-        let (mut missed, mut noise) = (0.0, 0.0);
-        for &k in band {
-            let (value, sigma) = reading(k);
-            missed += f64::from(value - grid[rows[k] as usize]).powi(2);
-            noise += f64::from(sigma).powi(2);
-        }
-        let weight = match noise < missed {
-            true => (1.0 - noise / missed) as f32,
+    let bands = Bands::new(rows);
+    let predicted = |k: usize| grid[rows[k] as usize];
+    let misses = bands.misses(&reading, predicted);
+    let weights = misses.iter().map(|miss| Weight { reading: miss.weight(), follows: 1.0 });
+    bands.weigh(rows, weights, reading, grid)
+}
+
+/// Rows of like fineness together, the all-ones row left out.
+struct Bands {
+    /// Positions of the rows, the coarsest first.
+    positions: Vec<usize>,
+    /// Number of rows of each band but the last, which may have fewer.
+    each: usize,
+    /// Position of the all-ones row, which no other row predicts.
+    all_ones: Option<usize>,
+}
+
+/// What predictions miss of the readings of a band, and what noise alone would miss: sums of squares.
+#[derive(Debug, Clone, Copy, Default)]
+struct Miss {
+    missed: f64,
+    noise: f64,
+}
+
+impl Miss {
+    fn add(&mut self, other: Self) {
+        self.missed += other.missed;
+        self.noise += other.noise;
+    }
+
+    /// The weight of a reading of this band.
+    fn weight(&self) -> f32 {
+        match self.noise < self.missed {
+            true => (1.0 - self.noise / self.missed) as f32,
             // Without noise and without a miss, reading and prediction are one.
-            false => f32::from(u8::from(noise == 0.0)),
-        };
-        for &k in band {
-            let (value, sigma) = reading(k);
-            let predicted = &mut grid[rows[k] as usize];
-            let missed = value - *predicted;
-            let weight = match (WITHIN * sigma).powi(2) / missed.powi(2) {
-                beyond if beyond < 1.0 => weight.max(1.0 - beyond),
-                _ => weight,
-            };
-            *predicted = value - (1.0 - weight) * missed;
-            weights += f64::from(weight);
+            false => f32::from(u8::from(self.noise == 0.0)),
         }
     }
-    if let Some(k) = rows.iter().position(|row| *row == 0) {
-        grid[0] = reading(k).0;
+}
+
+impl Bands {
+    fn new(rows: &Rows) -> Self {
+        let positions = order::positions_by_sequency(rows);
+        let count = (positions.len() / LEAST_OF_A_BAND).clamp(1, MOST_BANDS);
+        let each = positions.len().div_ceil(count).max(1);
+        Self { positions, each, all_ones: rows.iter().position(|row| *row == 0) }
     }
-    if positions.is_empty() { 1.0 } else { weights / positions.len() as f64 }
+
+    /// What `predicted` misses of the readings of each band.
+    fn misses(
+        &self,
+        reading: impl Fn(usize) -> (f32, f32),
+        predicted: impl Fn(usize) -> f32,
+    ) -> Vec<Miss> {
+        let of_band = |band: &[usize]| {
+            band.iter().fold(Miss::default(), |mut sum, &k| {
+                let (value, sigma) = reading(k);
+                let missed = f64::from(value - predicted(k)).powi(2);
+                sum.add(Miss { missed, noise: f64::from(sigma).powi(2) });
+                sum
+            })
+        };
+        self.positions.chunks(self.each).map(of_band).collect()
+    }
+
+    /// Replaces the measured rows of `grid` by weighted means, and gives the mean weight of the readings,
+    /// as it were beside predictions without them.
+    fn weigh(
+        &self,
+        rows: &Rows,
+        weights: impl IntoIterator<Item = Weight>,
+        reading: impl Fn(usize) -> (f32, f32),
+        grid: &mut [f32],
+    ) -> f64 {
+        let mut sum = 0.0;
+        for (band, of_band) in self.positions.chunks(self.each).zip(weights) {
+            let beside = 1.0 - (1.0 - of_band.reading) * of_band.follows;
+            for &k in band {
+                let (value, sigma) = reading(k);
+                let predicted = &mut grid[rows[k] as usize];
+                let missed = value - *predicted;
+                let weight = match (WITHIN * sigma).powi(2) / missed.powi(2) {
+                    beyond if beyond < 1.0 => beside.max(1.0 - beyond),
+                    _ => beside,
+                };
+                *predicted = value - (1.0 - weight) * missed;
+                sum += f64::from(1.0 - (1.0 - weight) / of_band.follows);
+            }
+        }
+        if let Some(k) = self.all_ones {
+            grid[0] = reading(k).0;
+        }
+        if self.positions.is_empty() { 1.0 } else { sum / self.positions.len() as f64 }
+    }
+}
+
+/// The weight of the readings of a band.
+#[derive(Debug, Clone, Copy)]
+struct Weight {
+    /// Beside a prediction that was made without the reading.
+    reading: f32,
+    /// How many times farther such a prediction is from the reading than the one at hand, which may have
+    /// been made with the reading and follow it, noise and all. 1: it was made without.
+    follows: f32,
+}
+
+/// The weights of readings of one kind, by what is predicted of some of them with and without each
+/// reading. A prediction that was made with a reading follows its noise. So it is first moved away from
+/// the reading, by as much as the sample's predictions follow.
+pub(super) struct KindWeights {
+    bands: Bands,
+    misses: Vec<Miss>,
+    own: Vec<Own>,
+}
+
+/// What predictions with a reading miss, in a band: times what those without it miss, and squared.
+#[derive(Debug, Clone, Copy, Default)]
+struct Own {
+    both: f64,
+    with: f64,
+}
+
+impl Own {
+    fn follows(&self) -> f32 {
+        if self.with > 0.0 { (self.both / self.with).max(1.0) as f32 } else { 1.0 }
+    }
+}
+
+impl KindWeights {
+    pub fn new(rows: &Rows) -> Self {
+        let bands = Bands::new(rows);
+        let count = bands.positions.len().div_ceil(bands.each);
+        Self { bands, misses: vec![Miss::default(); count], own: vec![Own::default(); count] }
+    }
+
+    /// Adds a measurement of the kind: `reading` gives value and noise of the k-th row, `without` and
+    /// `with` what is predicted without and with it.
+    pub fn add(
+        &mut self,
+        reading: impl Fn(usize) -> (f32, f32),
+        without: impl Fn(usize) -> f32,
+        with: impl Fn(usize) -> f32,
+    ) {
+        let bands = self.bands.positions.chunks(self.bands.each);
+        for ((band, miss), own) in bands.zip(&mut self.misses).zip(&mut self.own) {
+            for &k in band {
+                let (value, sigma) = reading(k);
+                let [without, with] = [without(k), with(k)].map(|p| f64::from(value - p));
+                miss.add(Miss { missed: without * without, noise: f64::from(sigma).powi(2) });
+                own.both += without * with;
+                own.with += with * with;
+            }
+        }
+    }
+
+    /// Replaces the measured rows of `grid`, a prediction with the readings, by weighted means, and gives
+    /// the mean weight.
+    pub fn weigh(
+        &self,
+        rows: &Rows,
+        reading: impl Fn(usize) -> (f32, f32),
+        grid: &mut [f32],
+    ) -> f64 {
+        let of_band =
+            |(miss, own): (&Miss, &Own)| Weight { reading: miss.weight(), follows: own.follows() };
+        let weights = self.misses.iter().zip(&self.own).map(of_band);
+        self.bands.weigh(rows, weights, reading, grid)
+    }
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingErro
     hear_recording(recording, |_, _| Ok(()))
 }
 
-/// The sum of each frame that arrived in order, and the account of all frames of the recording. `fits`
+/// The sum of each frame that arrived in order, with the noise that all of them show, and the account of all frames of the recording. `fits`
 /// is asked for each number of frames before they are kept.
 ///
 /// # Errors
@@ -80,5 +80,7 @@ pub fn frames_of_recording<E: From<RecordingError>>(
         }
         Ok::<(), E>(())
     })?;
-    Ok((frames, tally))
+    let noise = tally.integrated().noise_of_a_sweep();
+    let known = |frame: Integrated| frame.with_noise_of_a_sweep(noise);
+    Ok((frames.into_iter().map(known).collect(), tally))
 }

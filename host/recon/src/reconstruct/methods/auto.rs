@@ -127,6 +127,16 @@ impl Reconstruct for Auto {
         Ok(self.best(measurements)?.1)
     }
 
+    fn reconstruct_kind(
+        &self,
+        measurements: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        match measurements.first().map(|first| self.settled(first)).transpose()?.flatten() {
+            None => Ok(Vec::new()),
+            Some(settled) => settled.reconstruct_kind(measurements),
+        }
+    }
+
     fn settled(
         &self,
         first: &Measurements,
@@ -179,6 +189,14 @@ impl Reconstruct for Settled {
 
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
         Ok(self.marked(self.method.reconstruct(measurements)?))
+    }
+
+    fn reconstruct_kind(
+        &self,
+        measurements: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        let made = self.method.reconstruct_kind(measurements)?;
+        Ok(made.into_iter().map(|made| self.marked(made)).collect())
     }
 
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {

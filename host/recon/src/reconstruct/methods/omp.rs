@@ -1,12 +1,15 @@
 //! Orthogonal matching pursuit, in a basis or over a user's own atoms, on the processor or a GPU.
 
 use crate::omp::BackendError;
+use crate::reconstruct::kind::omp_kind;
 use crate::reconstruct::method::{Entry, OwnAtoms, Setting};
+use crate::reconstruct::stack::with_common_noise;
 use crate::reconstruct::{
     MatrixMethod, Method, MethodSettings, OmpReconstruction, OmpSettings, Reconstruct,
     ReconstructError, Reconstruction, Report, omp, omp_over, omp_video,
 };
 use crate::{Backend, Measurements};
+use rayon::prelude::*;
 
 const NAME: &str = "OMP";
 
@@ -85,6 +88,21 @@ impl Reconstruct for Omp {
             Some(atoms) => omp_over(measurements, &atoms.values, &self.settings),
         };
         Ok(self.reported(found?))
+    }
+
+    fn reconstruct_kind(
+        &self,
+        measurements: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        let measurements = &with_common_noise(measurements);
+        let made = match self.atoms {
+            None => omp_kind(measurements, &self.settings)?,
+            Some(_) => None,
+        };
+        match made {
+            Some(made) => Ok(made.into_iter().map(|found| self.reported(found)).collect()),
+            None => measurements.par_iter().map(|measured| self.reconstruct(measured)).collect(),
+        }
     }
 
     fn reconstruct_video(

@@ -1,10 +1,13 @@
 //! The common part of the methods with a [`Penalty`]: settings, and a report.
 
 use crate::Measurements;
+use crate::reconstruct::kind::regularised_kind;
+use crate::reconstruct::stack::with_statistics;
 use crate::reconstruct::{
     MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction, Recursive,
-    RecursiveSettings, RegularisedSettings, Report, fused_frame, regularised,
+    RecursiveSettings, Regularised, RegularisedSettings, Report, fused_frame, regularised,
 };
+use rayon::prelude::*;
 
 struct Penalised {
     name: &'static str,
@@ -25,14 +28,9 @@ pub(super) fn prepare(
     Ok(Box::new(Penalised { name, settings }))
 }
 
-impl Reconstruct for Penalised {
-    fn name(&self) -> &str {
-        self.name
-    }
-
-    fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
+impl Penalised {
+    fn reported(&self, found: Regularised) -> Reconstruction {
         let RegularisedSettings { penalty, basis, .. } = self.settings;
-        let found = regularised(measurements, &self.settings)?;
         let mut report = Report::new(self.name);
         report.basis = penalty.has_basis().then(|| basis.to_string());
         report.strength = Some(found.strength);
@@ -41,7 +39,28 @@ impl Reconstruct for Penalised {
         report.residual = Some(found.residual);
         report.trust = Some(found.trust);
         report.noise = Some(found.noise);
-        Ok(Reconstruction { image: found.image, report })
+        Reconstruction { image: found.image, report }
+    }
+}
+
+impl Reconstruct for Penalised {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
+        Ok(self.reported(regularised(measurements, &self.settings)?))
+    }
+
+    fn reconstruct_kind(
+        &self,
+        measurements: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        let measurements = &with_statistics(measurements);
+        match regularised_kind(measurements, &self.settings)? {
+            Some(made) => Ok(made.into_iter().map(|found| self.reported(found)).collect()),
+            None => measurements.par_iter().map(|measured| self.reconstruct(measured)).collect(),
+        }
     }
 
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {

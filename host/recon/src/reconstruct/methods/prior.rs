@@ -2,11 +2,13 @@
 
 use crate::Measurements;
 use crate::reconstruct::method::{Entry, Setting};
-use crate::reconstruct::prior::{SharedNetwork, with_network};
+use crate::reconstruct::prior::{SharedNetwork, network_kind, with_network};
+use crate::reconstruct::stack::with_common_noise;
 use crate::reconstruct::{
     Method, Reconstruct, ReconstructError, Reconstruction, Recursive, RecursiveSettings,
     believed_frame,
 };
+use rayon::prelude::*;
 
 const NAME: &str = "learned prior";
 
@@ -36,6 +38,17 @@ impl Reconstruct for Prior {
 
     fn reconstruct(&self, measurements: &Measurements) -> Result<Reconstruction, ReconstructError> {
         with_network(measurements, self.network.get(), NAME)
+    }
+
+    fn reconstruct_kind(
+        &self,
+        measurements: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        let measurements = &with_common_noise(measurements);
+        match network_kind(measurements, &self.network, NAME)? {
+            Some(made) => Ok(made),
+            None => measurements.par_iter().map(|measured| self.reconstruct(measured)).collect(),
+        }
     }
 
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {

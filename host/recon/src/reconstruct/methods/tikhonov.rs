@@ -48,6 +48,13 @@ impl Reconstruct for Tikhonov {
         self.alone.reconstruct(measurements)
     }
 
+    fn reconstruct_kind(
+        &self,
+        measurements: &[Measurements],
+    ) -> Result<Vec<Reconstruction>, ReconstructError> {
+        self.alone.reconstruct_kind(measurements)
+    }
+
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {
         if self.basis != Basis::Dct {
             return Err(ReconstructError::Failed(format!(

@@ -1,6 +1,6 @@
 use super::*;
-use crate::reconstruct::{Method, MethodSettings, Reconstruct};
-use crate::testing::{measured, normal, scene, side};
+use crate::reconstruct::{Method, MethodSettings, Reconstruct, stack};
+use crate::testing::{measured, noisy, normal, scene, side};
 use crate::{Order, fwht as walsh};
 use proptest::prelude::*;
 use rand::SeedableRng;
@@ -168,7 +168,28 @@ fn a_choice_leaves_out_a_network_that_does_not_take_the_side() {
     let settings = MethodSettings { network, ..MethodSettings::default() };
     let auto = Method::AUTO.prepare(&settings).unwrap();
     let rows = Order::ZigZag.rows(side(8)).unwrap();
-    let small = crate::testing::noisy(&rows, &scene(side(8), 1), 0.1, 1);
+    let small = noisy(&rows, &scene(side(8), 1), 0.1, 1);
     let chosen = auto.reconstruct(&small).unwrap().report.chosen;
     assert!(chosen.is_some_and(|chosen| chosen != "prior"), "{chosen:?}");
+}
+
+#[test]
+fn the_frames_of_a_kind_are_believed_together() {
+    let truth = scene(side(32), 1);
+    let rows = Order::ZigZag.rows(side(32)).unwrap().first(512);
+    let frames: Vec<_> = (0..10).map(|k| noisy(&rows, &truth, 3.0, k)).collect();
+    let error = |made: &[Reconstruction]| {
+        let pixels = made.iter().flat_map(|made| made.image.pixels().iter().zip(&truth));
+        pixels.map(|(found, truth)| (f64::from(*found) - truth).powi(2)).sum::<f64>().sqrt()
+    };
+    let right = ready(Oracle { truth: Some(truth.clone()), seed: 0 });
+    let alone: Vec<_> = frames.iter().map(|frame| right.reconstruct(frame).unwrap()).collect();
+    let together = stack(&*right, &frames).unwrap();
+    assert!(together.iter().all(|made| made.report.trust == Some(1.0)));
+    assert!(error(&together) < 1.02 * error(&alone), "{} {}", error(&together), error(&alone));
+    // A network that is wrong is not believed for any.
+    let wrong = ready(Oracle { truth: None, seed: 3 });
+    for made in stack(&*wrong, &frames).unwrap() {
+        assert!(made.report.to_string().contains("do not support the network"), "{}", made.report);
+    }
 }
