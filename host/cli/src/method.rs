@@ -7,6 +7,7 @@ use clap::{Args, FromArgMatches};
 use nirspi::imaging::MethodReport;
 use nirspi::reconstruct::{Recipe, Solver, own_atoms, read_atoms};
 use nirspi::source::FirstPatterns;
+use nirspi_nets::Device;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{
     self, Method, MethodSettings, Reconstruct, ReconstructError, Sparsity, Strength,
@@ -47,7 +48,8 @@ pub struct MethodArgs {
     /// OMP: no negative light. This needs --basis pixel or --dictionary
     #[arg(long, conflicts_with = "as_printed")]
     pub non_negative: bool,
-    /// OMP: where to compute: auto, cpu, wgpu or cuda. One image is too little work for a GPU, so auto is the cpu
+    /// OMP, and networks that enhance its images: where to compute: auto, cpu, wgpu or cuda. One image is too little work
+    /// for a GPU, so auto is the cpu
     #[arg(long, value_name = "BACKEND", default_value_t = Backend::Auto)]
     pub backend: Backend,
 }
@@ -129,6 +131,13 @@ impl MethodArgs {
         let (method, settings, dictionary) =
             (self.method, self.settings()?, self.dictionary.clone());
         Ok(Solver::new(Recipe { method, settings, dictionary, first, sampling })?)
+    }
+
+    /// The device of the networks: the backend of OMP. `auto` is the processor, as one image at a time is too
+    /// little work for a GPU that was not requested.
+    pub fn device(&self) -> Result<Device> {
+        let backend = if self.backend == Backend::Auto { Backend::Cpu } else { self.backend };
+        Ok(Device::open(backend)?)
     }
 
     /// The method, ready for images of this side.

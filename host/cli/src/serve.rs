@@ -12,8 +12,6 @@ use nirspi::exposure::Light;
 use nirspi::files::{interrupt, read_small_text};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_nets::Device;
-use nirspi_recon::omp::Backend;
 use nirspi_recon::{Sampling, Side};
 use nirspi_serve::settings::{MAX_FRAMES, Settings};
 use nirspi_serve::{
@@ -126,7 +124,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let server = Server::bind(&args.listen, access, made())
         .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
     let imaging =
-        Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, device(args)?)?;
+        Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, args.method.device()?)?;
     let settings = Settings {
         strength: args.method.strength,
         warm_start: args.warm_start,
@@ -153,13 +151,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let served = serve(server, source, connected, imaging, settings, &stop)?;
     print::line(format_args!("stopped: {served}"))?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The device of the networks: the backend of OMP. One image at a time is too little work for a GPU
-/// that was not requested.
-fn device(args: &Args) -> Result<Device> {
-    let backend = args.method.backend;
-    Ok(Device::open(if backend == Backend::Auto { Backend::Cpu } else { backend })?)
 }
 
 /// The scene before a virtual camera in this process.

@@ -12,7 +12,7 @@ use nirspi::imaging::MethodReport;
 use nirspi::source::{FirstPatterns, Index, Several};
 use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
-    Report, Setting, Sparsity, Stacked, Strength,
+    Reconstruction, Report, Setting, Sparsity, Strength, stack_while,
 };
 use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Side};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
@@ -149,7 +149,7 @@ fn of_method(error: ReconstructError) -> PyErr {
 
 /// A method made ready for measurements of the same rows.
 struct Ready {
-    method: Stacked,
+    method: Box<dyn Reconstruct>,
     rows: Rows,
     first: FirstPatterns,
     sampling: f64,
@@ -169,7 +169,7 @@ impl Ready {
         sampling: f64,
         noise: Option<f64>,
     ) -> PyResult<Self> {
-        let method = Stacked::new(method.prepare(settings).map_err(of_method)?);
+        let method = method.prepare(settings).map_err(of_method)?;
         let (whole, order) = first.among(&rows, sampling).map_err(refusal)?;
         Ok(Self { method, rows, first, sampling, noise, whole, order })
     }
@@ -183,11 +183,6 @@ impl Ready {
         self.first.take(&frame, self.sampling).map_err(refusal)
     }
 
-    /// Chooses the method by these differences, before several threads make images.
-    fn settle(&self, d: &[f64]) -> PyResult<()> {
-        self.method.settle(&self.taken(d)?.0).map_err(of_method)
-    }
-
     /// Writes the image of these differences to `pixels`.
     fn image(&self, d: &[f64], pixels: &mut [f32]) -> PyResult<Made> {
         let (used, order) = self.taken(d)?;
@@ -195,20 +190,39 @@ impl Ready {
         Made::new(report, &used, order, pixels)
     }
 
-    /// The images of a video, each of which may start from those before.
-    fn video(&self, d: &[f64], pixels: &mut [f32]) -> PyResult<Vec<Made>> {
+    /// Writes the images of these differences to `pixels`, one after another: each frame of a video may
+    /// start from those before, and what is the same for all of a kind is found out once.
+    fn images(
+        &self,
+        d: &[f64],
+        pixels: &mut [f32],
+        warm: bool,
+        stop: &AtomicBool,
+    ) -> PyResult<Vec<Made>> {
+        let area = self.rows.side().area();
+        let is_on = || !stop.load(Ordering::Relaxed);
+        if !warm && self.method.is_of_each() {
+            let one = |(d, place): (&[f64], &mut [f32])| match is_on() {
+                true => self.image(d, place),
+                false => Err(stopped()),
+            };
+            let frames = d.par_chunks_exact(self.rows.len());
+            return frames.zip(pixels.par_chunks_exact_mut(area)).map(one).collect();
+        }
         let frames = d.par_chunks_exact(self.rows.len());
         let (used, orders): (Vec<Measurements>, Vec<String>) =
             frames.map(|d| self.taken(d)).collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
-        let made = self.method.reconstruct_video(&used).map_err(of_method)?;
-        let places = pixels.chunks_exact_mut(self.rows.side().area());
-        let parts = made.into_iter().zip(used.iter().zip(orders)).zip(places);
-        parts
-            .map(|((made, (used, order)), place)| {
-                place.copy_from_slice(made.image.pixels());
-                Made::new(made.report, used, order, place)
-            })
-            .collect()
+        let going_on = || if is_on() { Ok(()) } else { Err(ReconstructError::Stopped) };
+        let made = match warm {
+            true => self.method.reconstruct_video(&used),
+            false => stack_while(&*self.method, &used, &going_on),
+        };
+        let parts = made.map_err(of_method)?.into_iter().zip(used.iter().zip(orders));
+        let one = |((made, (used, order)), place): ((Reconstruction, _), &mut [f32])| {
+            place.copy_from_slice(made.image.pixels());
+            Made::new(made.report, used, order, place)
+        };
+        parts.zip(pixels.chunks_exact_mut(area)).map(one).collect()
     }
 }
 
@@ -304,19 +318,7 @@ pub fn reconstruct<'py>(
     let places = fill(&mut place)?;
     let account = long(py, |stop| {
         let ready = Ready::new(method, &settings, rows, first, sampling, noise)?;
-        let made = if warm {
-            ready.video(d, places)?
-        } else {
-            if let Some(first) = d.chunks_exact(ready.rows.len()).next() {
-                ready.settle(first)?;
-            }
-            let one = |(d, place): (&[f64], &mut [f32])| match stop.load(Ordering::Relaxed) {
-                true => Err(stopped()),
-                false => ready.image(d, place),
-            };
-            let frames = d.par_chunks_exact(ready.rows.len());
-            frames.zip(places.par_chunks_exact_mut(area)).map(one).collect::<PyResult<_>>()?
-        };
+        let made = ready.images(d, places, warm, stop)?;
         Account::of(made, method)
     })?;
     drop(place);
@@ -351,8 +353,8 @@ pub fn reconstruct_file<'py>(
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
     settings.check(method).map_err(of_method)?;
-    if method == Method::AUTO {
-        // The first measurement chooses, before several threads make images.
+    if !method.prepare(&settings).map_err(of_method)?.is_of_each() {
+        // What is the same for all measurements is found out before their images are made.
         return Ok(None);
     }
     let Some(mut several) = long(py, |_| Several::of(&path, &source).map_err(of_source))? else {

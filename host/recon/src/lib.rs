@@ -15,6 +15,7 @@
 //! | [`basis`] | an image | coefficients, most of them nearly zero |
 //! | [`omp`] | measurements and a dictionary | a few coefficients that explain the measurements |
 //! | [`reconstruct`] | measurements | an image |
+//! | [`Repeats`] | measurements of one scene, one after another | their noise |
 //! | [`metrics`] | two images | a number that compares them |
 //! | [`backend`] | the name of a backend | a [`Backend`] |
 //! | [`Sampling`] | `0.3`, `30%` or `30` | a checked share of the patterns |
@@ -31,6 +32,7 @@ pub mod metrics;
 pub mod omp;
 pub mod order;
 pub mod reconstruct;
+mod repeats;
 mod rows;
 mod sampling;
 mod side;
@@ -46,6 +48,7 @@ pub use law::{Dropout, Outlier};
 pub use leak::{Leak, LeakError, Sweep};
 pub use measurements::{MeasurementError, Measurements, ShorterSweep};
 pub use order::{NamedOrder, Order, ParseOrderError};
+pub use repeats::Repeats;
 pub use rows::{Rows, RowsError};
 pub use sampling::{Sampling, SamplingError};
 pub use side::{Side, SideError};

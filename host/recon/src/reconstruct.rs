@@ -47,6 +47,7 @@ mod weight;
 pub use explanation::{Explanation, explanation};
 pub use frame::{believed_frame, fused_frame};
 pub use held_back::HeldBack;
+pub use kind::GoingOn;
 pub use method::{Method, MethodSettings, OwnAtoms, ParseMethodError, Reconstruct, Setting};
 pub use methods::hadamard;
 pub use noise::estimated_noise;
@@ -57,7 +58,7 @@ pub use own_matrix::{
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};
-pub use stack::stack;
+pub use stack::{stack, stack_while};
 pub use stacked::Stacked;
 pub use video::{VideoFrame, omp_video};
 pub use weight::WITHIN;
@@ -280,6 +281,9 @@ pub enum ReconstructError {
     /// The pursuit refused the problem.
     #[error(transparent)]
     Pursuit(#[from] OmpError),
+    /// The user has stopped the work.
+    #[error("stopped")]
+    Stopped,
     /// A user's own method found no image, for this reason.
     #[error("{0}")]
     Failed(String),

@@ -196,6 +196,15 @@ pub enum ExportError {
         #[source]
         problem: crate::imaging::EnhanceError,
     },
+    /// The images of a video cannot be made.
+    #[error("{}", .path.display())]
+    Images {
+        /// The recording.
+        path: PathBuf,
+        /// The problem.
+        #[source]
+        problem: ReconstructError,
+    },
     /// An image cannot be made of a frame.
     #[error("{}: frame {frame}", .path.display())]
     Image {

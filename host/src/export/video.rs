@@ -57,7 +57,7 @@ pub(super) fn apng(
 ) -> Result<usize, ExportError> {
     let frames = whole.frames();
     let mut groups = Groups::new(frames, MOST);
-    let problem = |problem| ExportError::Image { path: whole.path.clone(), frame: 0, problem };
+    let problem = |problem| ExportError::Images { path: whole.path.clone(), problem };
     let method = Method::default().prepare(&super::settings()).map_err(problem)?;
     let mut means = Vec::new();
     whole.each(|_, measurements| {

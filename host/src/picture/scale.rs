@@ -98,25 +98,25 @@ impl Scale {
     /// The scale of these values. Values that are not finite have no part in it.
     #[must_use]
     pub fn of(range: Range, unit: Unit, values: impl IntoIterator<Item = f32>) -> Self {
-        let mut sorted: Vec<f32> = values.into_iter().filter(|value| value.is_finite()).collect();
-        sorted.sort_unstable_by(f32::total_cmp);
-        let (least, most) = match sorted[..] {
-            [] => (0.0, 0.0),
-            [least, .., most] => (least, most),
-            [only] => (only, only),
-        };
+        let mut finite: Vec<f32> = values.into_iter().filter(|value| value.is_finite()).collect();
+        let ends = finite.iter().copied().map(|value| (value, value));
+        let both = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+        let (least, most) = ends.reduce(both).unwrap_or_default();
         let (black, white) = match range {
             Range::Unit => (0.0, 1.0),
             Range::Fixed(black, white) => (black, white),
             Range::Stretched => {
-                let last = sorted.len().saturating_sub(1);
+                let last = finite.len().saturating_sub(1);
                 let [low, high] = PERCENTILES.map(|percent| {
                     let at = (last as f64 * percent / 100.0).round() as usize;
-                    sorted.get(at).copied().unwrap_or(0.0)
+                    match finite.is_empty() {
+                        true => 0.0,
+                        false => *finite.select_nth_unstable_by(at, f32::total_cmp).1,
+                    }
                 });
                 // An image of a few specks alone is shown by its ends.
                 let (low, high) = if high > low { (low, high) } else { (least, most) };
-                let is_flat = unit.is_fraction() && high - low < FLAT && !sorted.is_empty();
+                let is_flat = unit.is_fraction() && high - low < FLAT && !finite.is_empty();
                 if is_flat { (low.min(0.0), high.max(1.0)) } else { (low, high) }
             }
         };

@@ -15,6 +15,7 @@ use super::{AMBER, FRAME, GROUND, MIDDLE};
 use crate::files::image::{encode_labelled, to_level};
 use crate::provenance::Provenance;
 use image::{Rgb, RgbImage};
+use rayon::prelude::*;
 
 /// Number of images in a row.
 const COLUMNS: usize = 8;
@@ -64,7 +65,7 @@ impl<'a> Sheet<'a> {
         let of = |values: &[f32]| Scale::of(Range::Stretched, unit, values.iter().copied());
         let all = images.iter().flat_map(|image| image.iter().copied());
         let common = Scale::of(Range::Stretched, unit, all);
-        let own: Vec<Scale> = images.iter().map(|image| of(image)).collect();
+        let own: Vec<Scale> = images.par_iter().map(|image| of(image)).collect();
         let span = |scale: &Scale| scale.white - scale.black;
         // A flat image is dark on every scale.
         let hidden =

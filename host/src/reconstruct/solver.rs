@@ -8,6 +8,7 @@ use nirspi_recon::reconstruct::{
 };
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, MeasurementError, Measurements, Rows, Sampling, ShorterSweep};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -190,13 +191,15 @@ impl Solver {
         let imaginary = sources.iter().filter_map(|source| source.imaginary.as_ref());
         let imaginary: Vec<Measurements> =
             imaginary.map(|part| Ok(take(part)?.0)).collect::<Result<_, SolverError>>()?;
-        let mut others = self.images(&imaginary, is_video)?.into_iter();
+        let others = self.images(&imaginary, is_video)?.into_iter().map(Some);
+        let others = others.chain(std::iter::repeat_with(|| None));
         let made = self.images(&used, is_video)?;
-        let all = made.into_iter().zip(used).zip(orders).zip(sources);
-        all.map(|(((made, used), order), source)| {
+        let all: Vec<_> = made.into_iter().zip(others).zip(used).zip(orders).zip(sources).collect();
+        let solved = |((((made, other), used), order), source): (_, &Source)| {
+            let (made, other): (Reconstruction, Option<Reconstruction>) = (made, other);
             let with_readings = source.flattened(made.with_readings(&used));
             let Reconstruction { image, report: made } = made;
-            let parts = others.next().map(|other| [image.clone(), other.image]);
+            let parts = other.map(|other| [image.clone(), other.image]);
             let image = match &parts {
                 None => image,
                 Some([real, imaginary]) => Image::magnitude(real, imaginary),
@@ -205,8 +208,8 @@ impl Solver {
             let image = source.flattened(image);
             let report = MethodReport { method: *method, made };
             Ok(Solved { image, with_readings, parts, used, order, report })
-        })
-        .collect()
+        };
+        all.into_par_iter().map(solved).collect()
     }
 }
 

@@ -8,6 +8,7 @@ use crate::integrate::Integrated;
 use crate::provenance::Taken;
 use crate::recording::{self, End, Recording, tally_recording};
 use crate::tally::Tally;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Sums the frames of a recording, and makes their account again.
@@ -26,7 +27,8 @@ pub(crate) fn of_sum(
 ) -> Result<Source, SourceError> {
     match tally.integrated() {
         integrated if integrated.frames() > 0 => {
-            of_frames(path, options, recording, integrated, tally)
+            let flat_field = flat_field(options, recording);
+            of_frames(path, options, recording, integrated, tally, &flat_field)
         }
         _ => Err(no_frame(path, tally)),
     }
@@ -52,7 +54,17 @@ pub(super) fn frames_of_recording(
     if frames.is_empty() {
         return Err(no_frame(path, &tally));
     }
-    frames.iter().map(|frame| of_frames(path, options, &recording, frame, &tally)).collect()
+    let flat_field = flat_field(options, &recording);
+    let source = |frame| of_frames(path, options, &recording, frame, &tally, &flat_field);
+    frames.par_iter().map(source).collect()
+}
+
+/// The flat field that is kept for the camera, or why it cannot be read; `None` if none is wanted.
+type FlatFieldRead = Option<Result<Option<KeptFlatField>, String>>;
+
+fn flat_field(options: &SourceOptions, recording: &Recording) -> FlatFieldRead {
+    let read = || KeptFlatField::of(&recording.identity).map_err(|e| causes::in_one_line(&e));
+    (!options.no_flat_field).then(read)
 }
 
 /// The measurements of the sum of some frames.
@@ -62,6 +74,7 @@ fn of_frames(
     recording: &Recording,
     integrated: &Integrated,
     tally: &Tally,
+    flat_field: &FlatFieldRead,
 ) -> Result<Source, SourceError> {
     let counters = tally.account().counters();
     let Recording { setup, settling, .. } = recording;
@@ -85,7 +98,7 @@ fn of_frames(
     let read = super::of_frames(measurements)
         .map_err(|problem| SourceError::Measurements { path: path.to_owned(), problem })?;
     let (dropouts, not_read, frames) = (Vec::new(), Vec::new(), Some(counters));
-    let (imaginary, reference, flat_field) = (None, None, None);
+    let (imaginary, reference) = (None, None);
     let source = Source {
         measurements: read.measurements,
         imaginary,
@@ -98,17 +111,14 @@ fn of_frames(
         damage: (!lacks.is_empty()).then(|| not_whole(counters, &lacks)),
         warnings: read.doubts.iter().map(ToString::to_string).collect(),
         notes,
-        flat_field,
+        flat_field: None,
     };
-    if options.no_flat_field {
-        return Ok(source);
-    }
-    Ok(match KeptFlatField::of(&recording.identity) {
-        Ok(Some(kept)) => source.with_flat_field(kept),
-        Ok(None) => source,
-        Err(problem) => {
+    Ok(match flat_field {
+        None | Some(Ok(None)) => source,
+        Some(Ok(Some(kept))) => source.with_flat_field(kept.clone()),
+        Some(Err(problem)) => {
             let mut source = source;
-            source.notes.push(format!("flat field not used: {}", causes::in_one_line(&problem)));
+            source.notes.push(format!("flat field not used: {problem}"));
             source
         }
     })

@@ -1,19 +1,17 @@
 //! The noise of a mean of frames, from the differences between one frame and the next.
 //!
 //! Frames of one run measure the same scene again, so what differs between a frame and the next is
-//! noise, and slow drift of the light hardly counts. Where the scene moves, coarse patterns differ
-//! more than noise does. Noise is the same in every pattern, so the median over the patterns tells
-//! it.
+//! noise: [`Repeats`].
 
-/// Squared differences between frames, pattern by pattern.
+use nirspi_recon::Repeats;
+
+/// Differences between frames, pattern by pattern.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Spread {
     last: Vec<i64>,
     last_sweeps: u64,
-    /// Squares of the differences of two frames' means of a sweep, scaled to the variance of one
-    /// sweep.
-    squares: Vec<f64>,
-    pairs: u64,
+    /// Of two frames' means of a sweep, scaled to the variance of one sweep.
+    repeats: Repeats,
 }
 
 impl Spread {
@@ -23,35 +21,23 @@ impl Spread {
             return;
         }
         if self.last.len() != sums.len() {
-            *self = Self { squares: vec![0.0; sums.len()], ..Self::default() };
+            *self = Self { repeats: Repeats::of(sums.len()), ..Self::default() };
             (self.last, self.last_sweeps) = (sums.collect(), sweeps);
             return;
         }
         let (before, now) = (1.0 / self.last_sweeps as f64, 1.0 / sweeps as f64);
-        let scale = 1.0 / (before + now);
-        for ((last, square), sum) in self.last.iter_mut().zip(&mut self.squares).zip(sums) {
+        let differences = self.last.iter_mut().zip(sums).map(|(last, sum)| {
             let difference = sum as f64 * now - *last as f64 * before;
-            *square += difference * difference * scale;
             *last = sum;
-        }
+            difference
+        });
+        self.repeats.add(differences, 1.0 / (before + now));
         self.last_sweeps = sweeps;
-        self.pairs += 1;
     }
 
     /// Standard deviation of the sum of one sweep; `None` before the second frame.
     pub(super) fn of_a_sweep(&self) -> Option<f64> {
-        if self.pairs == 0 || self.squares.is_empty() {
-            return None;
-        }
-        let mut squares = self.squares.clone();
-        let middle = squares.len() / 2;
-        let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
-        // Neighbouring differences share a frame, so `pairs` of them have about two thirds as many
-        // degrees of freedom. The median of a sum of squares is below its mean (E. Wilson and M.
-        // Hilferty, *The distribution of chi-square*, 1931).
-        let freedom = (self.pairs as f64 * 2.0 / 3.0).max(1.0);
-        let below = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
-        Some((median / self.pairs as f64 / below).sqrt())
+        self.repeats.noise()
     }
 }
 

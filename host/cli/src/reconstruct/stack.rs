@@ -10,7 +10,6 @@ use nirspi::reconstruct::{
     ManyImages, StackFolder, StackFolderError, StackReport, file_images, write_stack,
 };
 use nirspi::source::FirstPatterns;
-use nirspi_nets::Device;
 use nirspi_recon::reconstruct::{Method, Setting};
 use nirspi_recon::words::count_of;
 use std::process::ExitCode;
@@ -47,7 +46,7 @@ pub fn write(
         named,
         many,
         warm_start: args.warm_start,
-        enhance: args.enhance.then(Device::cpu),
+        enhance: args.enhance.then(|| args.method.device()).transpose()?,
         out: &args.out,
         made: made(),
     };

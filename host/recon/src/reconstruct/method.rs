@@ -9,6 +9,7 @@
 //! `methods.rs`. Argument parsers, help texts, comparisons, reports and the live page take their
 //! lists from [`Method::ALL`].
 
+use super::kind::GoingOn;
 use super::prior::SharedNetwork;
 use super::report::{Reconstruction, Report};
 use super::{MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength};
@@ -68,15 +69,23 @@ pub trait Reconstruct: Send + Sync {
 
     /// The images of measurements of one kind, in their order; [`stack`](super::stack) says what a kind
     /// is. A method overrides this function if it chooses something for each measurement that is the
-    /// same for all of a kind, or makes many images at once faster than one by one.
+    /// same for all of a kind, or makes many images at once faster than one by one. It calls `going_on`
+    /// before each.
     ///
     /// # Errors
-    /// As [`Reconstruct::reconstruct`], of the first measurement that has no image.
+    /// As [`Reconstruct::reconstruct`], of the first measurement that has no image; or that of `going_on`.
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        measurements.par_iter().map(|measured| self.reconstruct(measured)).collect()
+        let one = |measured| going_on().and_then(|()| self.reconstruct(measured));
+        measurements.par_iter().map(one).collect()
+    }
+
+    /// Whether the image of a measurement is the same alone and among others of its kind.
+    fn is_of_each(&self) -> bool {
+        false
     }
 
     /// For a method that chooses among others: the choice for measurements like `first`, for a stack

@@ -7,27 +7,31 @@
 //! # What a kind is
 //! Measurements of the same rows, whose sizes (roots of the sums of squares) are within a [factor](LIKE)
 //! of two of the middle one. Measurements of other sizes are made by themselves, and so are kinds of
-//! fewer than [`LEAST`] measurements. What is found out is that of a [`SAMPLE`], evenly chosen: the
-//! middle noise, and the mean falloff.
+//! fewer than [`LEAST`] measurements. What is found out is that of a [sample](super::kind::SAMPLE), evenly chosen: the
+//! mean falloff, and the noise: that by which repeated measurements of one scene differ
+//! ([`Repeats`](crate::Repeats)), else the middle one of the sample. It is found out anew every [`AT_A_TIME`] measurements, so that a
+//! long recording may change, and takes no more memory than a short one.
 //!
 //! # Invariant
 //! Images are in the order of the measurements, whatever the number of threads, and measurements that
 //! are alone in their kind have the image that [`Reconstruct::reconstruct`] gives
 //! (`tests::a_stack_has_the_images_of_its_kinds_in_order`).
 
+use super::kind::{GoingOn, sample};
 use super::noise;
 use super::{Reconstruct, ReconstructError, Reconstruction};
 use crate::Measurements;
 use crate::measurements::Kind;
+use crate::repeats::noise_of_repeats;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
+/// Measurements that are looked at together. More give the images of one stack after another.
+const AT_A_TIME: usize = 4096;
+
 /// The fewest measurements that are a kind.
 const LEAST: usize = 8;
-
-/// Measurements of a kind of which is found out what all have in common.
-pub(super) const SAMPLE: usize = 9;
 
 /// The largest ratio of the sizes of a measurement and the middle one of its kind.
 const LIKE: f64 = 2.0;
@@ -40,24 +44,52 @@ pub fn stack(
     method: &dyn Reconstruct,
     measurements: &[Measurements],
 ) -> Result<Vec<Reconstruction>, ReconstructError> {
+    stack_while(method, measurements, &|| Ok(()))
+}
+
+/// As [`stack`]; `going_on` is called before each image, from any thread.
+///
+/// # Errors
+/// As [`stack`]; and the error of `going_on`.
+pub fn stack_while(
+    method: &dyn Reconstruct,
+    measurements: &[Measurements],
+    going_on: GoingOn<'_>,
+) -> Result<Vec<Reconstruction>, ReconstructError> {
+    if method.is_of_each() {
+        return each(method, measurements, going_on);
+    }
+    let parts = measurements.chunks(AT_A_TIME).map(|part| part_of_stack(method, part, going_on));
+    Ok(parts.collect::<Result<Vec<_>, _>>()?.concat())
+}
+
+fn part_of_stack(
+    method: &dyn Reconstruct,
+    measurements: &[Measurements],
+    going_on: GoingOn<'_>,
+) -> Result<Vec<Reconstruction>, ReconstructError> {
     let mut made: Vec<Option<Reconstruction>> = vec![None; measurements.len()];
     let (kinds, alone) = kinds(measurements);
     for positions in kinds {
         let of_kind: Vec<Measurements> =
             positions.iter().map(|&k| measurements[k].clone()).collect();
-        let images = method.reconstruct_kind(&of_kind)?;
+        let images = method.reconstruct_kind(&of_kind, going_on)?;
         positions.into_iter().zip(images).for_each(|(k, image)| made[k] = Some(image));
     }
-    let images = alone.par_iter().map(|&k| method.reconstruct(&measurements[k]));
-    let images: Vec<Reconstruction> = images.collect::<Result<_, _>>()?;
+    let one = |&k: &usize| going_on().and_then(|()| method.reconstruct(&measurements[k]));
+    let images: Vec<Reconstruction> = alone.par_iter().map(one).collect::<Result<_, _>>()?;
     alone.into_iter().zip(images).for_each(|(k, image)| made[k] = Some(image));
     Ok(made.into_iter().flatten().collect())
 }
 
-/// Some of a number of things, evenly chosen.
-pub(super) fn sample(count: usize) -> impl Iterator<Item = usize> {
-    let taken = count.min(SAMPLE);
-    (0..taken).map(move |k| (2 * k + 1) * count / (2 * taken))
+/// The image of each measurement by itself.
+pub(super) fn each(
+    method: &dyn Reconstruct,
+    measurements: &[Measurements],
+    going_on: GoingOn<'_>,
+) -> Result<Vec<Reconstruction>, ReconstructError> {
+    let one = |measured| going_on().and_then(|()| method.reconstruct(measured));
+    measurements.par_iter().map(one).collect()
 }
 
 /// The positions of each kind, and of the measurements that are made by themselves.
@@ -109,7 +141,8 @@ pub(super) fn with_statistics(measurements: &[Measurements]) -> Vec<Measurements
     let falloff = found.iter().map(|kind| kind.falloff).sum::<f64>() / found.len() as f64;
     let mut noises: Vec<f64> = found.iter().map(|kind| kind.noise).collect();
     noises.sort_unstable_by(f64::total_cmp);
-    let kind = Kind { noise: noises[noises.len() / 2], falloff };
+    let noise = noise_of_repeats(measurements).unwrap_or(noises[noises.len() / 2]);
+    let kind = Kind { noise, falloff };
     measurements.iter().cloned().map(|measured| measured.of_kind(kind)).collect()
 }
 
@@ -136,9 +169,10 @@ mod tests {
         fn reconstruct_kind(
             &self,
             all: &[Measurements],
+            going_on: GoingOn<'_>,
         ) -> Result<Vec<Reconstruction>, ReconstructError> {
             self.1.lock().unwrap().push(all.len());
-            self.0.reconstruct_kind(all)
+            self.0.reconstruct_kind(all, going_on)
         }
     }
 
@@ -192,6 +226,17 @@ mod tests {
             let alone = frames.iter().map(|frame| method.reconstruct(frame).unwrap());
             assert_eq!(made, alone.collect::<Vec<_>>());
             assert!(method.1.into_inner().unwrap().is_empty());
+        }
+    }
+
+    #[test]
+    fn a_stack_that_is_stopped_ends_with_that_word() {
+        let scene = scene(side(16), 1);
+        let frames: Vec<_> = (0..20).map(|k| noisy(&rows(0.5), &scene, 0.5, k)).collect();
+        for word in ["hadamard", "omp", "tikhonov", "auto"] {
+            let method = prepared(word.parse().unwrap());
+            let ended = stack_while(&method, &frames, &|| Err(ReconstructError::Stopped));
+            assert_eq!(ended.err(), Some(ReconstructError::Stopped), "{word}");
         }
     }
 

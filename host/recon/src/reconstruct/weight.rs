@@ -41,11 +41,7 @@ pub(super) fn weigh_each(
     reading: impl Fn(usize) -> (f32, f32),
     grid: &mut [f32],
 ) -> f64 {
-    let bands = Bands::new(rows);
-    let predicted = |k: usize| grid[rows[k] as usize];
-    let misses = bands.misses(&reading, predicted);
-    let weights = misses.iter().map(|miss| Weight { reading: miss.weight(), follows: 1.0 });
-    bands.weigh(rows, weights, reading, grid)
+    Bands::new(rows).weigh_alone(rows, reading, grid)
 }
 
 /// Rows of like fineness together, the all-ones row left out.
@@ -106,6 +102,18 @@ impl Bands {
         self.positions.chunks(self.each).map(of_band).collect()
     }
 
+    /// Replaces the measured rows of `grid` by weighted means, by what this prediction misses.
+    fn weigh_alone(
+        &self,
+        rows: &Rows,
+        reading: impl Fn(usize) -> (f32, f32),
+        grid: &mut [f32],
+    ) -> f64 {
+        let misses = self.misses(&reading, |k: usize| grid[rows[k] as usize]);
+        let weights = misses.iter().map(|miss| Weight { reading: miss.weight(), follows: 1.0 });
+        self.weigh(rows, weights, reading, grid)
+    }
+
     /// Replaces the measured rows of `grid` by weighted means, and gives the mean weight of the readings,
     /// as it were beside predictions without them.
     fn weigh(
@@ -154,6 +162,8 @@ pub(super) struct KindWeights {
     bands: Bands,
     misses: Vec<Miss>,
     own: Vec<Own>,
+    /// Whether a measurement was [added](Self::add). If none was, each is weighed by its own misses.
+    is_found: bool,
 }
 
 /// What predictions with a reading miss, in a band: times what those without it miss, and squared.
@@ -173,7 +183,8 @@ impl KindWeights {
     pub fn new(rows: &Rows) -> Self {
         let bands = Bands::new(rows);
         let count = bands.positions.len().div_ceil(bands.each);
-        Self { bands, misses: vec![Miss::default(); count], own: vec![Own::default(); count] }
+        let (misses, own) = (vec![Miss::default(); count], vec![Own::default(); count]);
+        Self { bands, misses, own, is_found: false }
     }
 
     /// Adds a measurement of the kind: `reading` gives value and noise of the k-th row, `without` and
@@ -184,6 +195,7 @@ impl KindWeights {
         without: impl Fn(usize) -> f32,
         with: impl Fn(usize) -> f32,
     ) {
+        self.is_found = true;
         let bands = self.bands.positions.chunks(self.bands.each);
         for ((band, miss), own) in bands.zip(&mut self.misses).zip(&mut self.own) {
             for &k in band {
@@ -204,6 +216,9 @@ impl KindWeights {
         reading: impl Fn(usize) -> (f32, f32),
         grid: &mut [f32],
     ) -> f64 {
+        if !self.is_found {
+            return self.bands.weigh_alone(rows, reading, grid);
+        }
         let of_band =
             |(miss, own): (&Miss, &Own)| Weight { reading: miss.weight(), follows: own.follows() };
         let weights = self.misses.iter().zip(&self.own).map(of_band);

@@ -1,6 +1,6 @@
 //! OMP of a kind: one pursuit for each measurement, over a dictionary that all share.
 
-use super::{Common, sample};
+use super::{Common, GoingOn, problems};
 use crate::Measurements;
 use crate::omp::sampled::{Prior, SampledHadamard};
 use crate::omp::{self, Limits, Remembered, solve_batch};
@@ -10,21 +10,22 @@ use crate::reconstruct::{
 use rayon::prelude::*;
 
 /// Measurements that are pursued at a time: enough for all processors, few enough for the memory.
-const AT_A_TIME: usize = 512;
+const AT_A_TIME: usize = 256;
 
 /// The images of measurements of one kind; `None` if these settings have to look at each by itself.
 pub(in super::super) fn omp_kind(
     measurements: &[Measurements],
     settings: &OmpSettings,
+    going_on: GoingOn<'_>,
 ) -> Result<Option<Vec<OmpReconstruction>>, ReconstructError> {
     settings.check()?;
     if settings.non_negative || settings.sparsity == Sparsity::Noise {
         return Ok(None);
     }
-    let some = sample(measurements, |measured| Problem::new(measured, settings));
+    let some = problems(measurements, |measured| Problem::new(measured, settings));
     let Some(first) = some.first() else { return Ok(Some(Vec::new())) };
     let (atoms, common) = match settings.sparsity {
-        Sparsity::Fixed(atoms) => (atoms, Common::believed()),
+        Sparsity::Fixed(atoms) => (atoms, Common::believed(first.rows)),
         Sparsity::CrossValidated { most, folds } => {
             let tried = selection::sparsities(first.rows.len(), most);
             let trusted = selection::OMP_TRUSTED;
@@ -48,6 +49,7 @@ pub(in super::super) fn omp_kind(
     let pursuit = omp::Problem { dictionary: &dictionary, limits };
     let mut made = Vec::with_capacity(measurements.len());
     for together in measurements.chunks(AT_A_TIME) {
+        going_on()?;
         let values: Vec<f32> =
             together.par_iter().flat_map_iter(|measured| in_units(measured).0).collect();
         let solutions = solve_batch(&pursuit, &values, settings.backend)?;

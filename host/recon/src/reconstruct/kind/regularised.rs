@@ -1,6 +1,6 @@
 //! A penalty on the images of a kind: one strength for all.
 
-use super::{Common, sample};
+use super::{Common, GoingOn, problems};
 use crate::Measurements;
 use crate::reconstruct::regularised::STRENGTHS;
 use crate::reconstruct::{
@@ -13,9 +13,10 @@ use rayon::prelude::*;
 pub(in super::super) fn regularised_kind(
     measurements: &[Measurements],
     settings: &RegularisedSettings,
+    going_on: GoingOn<'_>,
 ) -> Result<Option<Vec<Regularised>>, ReconstructError> {
     settings.check()?;
-    let some = sample(measurements, |measured| settings.problem(measured));
+    let some = problems(measurements, |measured| settings.problem(measured));
     let Some(first) = some.first() else { return Ok(Some(Vec::new())) };
     let every: Vec<usize> = (0..first.rows.len()).collect();
     // The strongest first: each strength starts from the result of the one before.
@@ -24,7 +25,7 @@ pub(in super::super) fn regularised_kind(
         all.pop().unwrap_or_default()
     };
     let (strengths, common) = match settings.strength {
-        Strength::Fixed(strength) => (vec![strength as f32], Common::believed()),
+        Strength::Fixed(strength) => (vec![strength as f32], Common::believed(first.rows)),
         Strength::CrossValidated { folds } => {
             let (count, trusted) = (STRENGTHS.len(), settings.trusted());
             let predict = |problem: &Problem<'_>, kept: &[usize]| {
@@ -44,9 +45,10 @@ pub(in super::super) fn regularised_kind(
         Strength::CrossValidated { .. } => words::shortest(strengths[strengths.len() - 1]),
     };
     let image = |measured: &Measurements| {
+        going_on()?;
         let problem = settings.problem(measured);
         let found = common.made(&problem, with(&problem, &strengths));
-        Regularised {
+        Ok(Regularised {
             image: found.image,
             strength,
             trust: f64::from(common.trust),
@@ -54,7 +56,7 @@ pub(in super::super) fn regularised_kind(
             reading_weight: found.reading_weight,
             held_back: common.held_back,
             noise: problem.noise_in_units(),
-        }
+        })
     };
-    Ok(Some(measurements.par_iter().map(image).collect()))
+    measurements.par_iter().map(image).collect::<Result<Vec<_>, _>>().map(Some)
 }

@@ -16,8 +16,8 @@ use crate::Measurements;
 use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::prior::SharedNetwork;
 use crate::reconstruct::{
-    HeldBack, MatrixMethod, Method, MethodSettings, Penalty, Reconstruct, ReconstructError,
-    Reconstruction, Recursive, RecursiveSettings, believed_frame,
+    GoingOn, HeldBack, MatrixMethod, Method, MethodSettings, Penalty, Reconstruct,
+    ReconstructError, Reconstruction, Recursive, RecursiveSettings, believed_frame,
 };
 use std::sync::Arc;
 
@@ -130,10 +130,11 @@ impl Reconstruct for Auto {
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
         match measurements.first().map(|first| self.settled(first)).transpose()?.flatten() {
             None => Ok(Vec::new()),
-            Some(settled) => settled.reconstruct_kind(measurements),
+            Some(settled) => settled.reconstruct_kind(measurements, going_on),
         }
     }
 
@@ -194,8 +195,9 @@ impl Reconstruct for Settled {
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        let made = self.method.reconstruct_kind(measurements)?;
+        let made = self.method.reconstruct_kind(measurements, going_on)?;
         Ok(made.into_iter().map(|made| self.marked(made)).collect())
     }
 

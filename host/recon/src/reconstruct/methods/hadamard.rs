@@ -28,6 +28,10 @@ impl Reconstruct for ZeroFilling {
         Ok(Reconstruction { image: hadamard(measurements), report: Report::new(self.name) })
     }
 
+    fn is_of_each(&self) -> bool {
+        true
+    }
+
     fn reconstruct_into(
         &self,
         measurements: &Measurements,

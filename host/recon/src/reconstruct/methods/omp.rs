@@ -3,13 +3,12 @@
 use crate::omp::BackendError;
 use crate::reconstruct::kind::omp_kind;
 use crate::reconstruct::method::{Entry, OwnAtoms, Setting};
-use crate::reconstruct::stack::with_common_noise;
+use crate::reconstruct::stack::{each, with_common_noise};
 use crate::reconstruct::{
-    MatrixMethod, Method, MethodSettings, OmpReconstruction, OmpSettings, Reconstruct,
+    GoingOn, MatrixMethod, Method, MethodSettings, OmpReconstruction, OmpSettings, Reconstruct,
     ReconstructError, Reconstruction, Report, omp, omp_over, omp_video,
 };
 use crate::{Backend, Measurements};
-use rayon::prelude::*;
 
 const NAME: &str = "OMP";
 
@@ -93,15 +92,16 @@ impl Reconstruct for Omp {
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
         let measurements = &with_common_noise(measurements);
         let made = match self.atoms {
-            None => omp_kind(measurements, &self.settings)?,
+            None => omp_kind(measurements, &self.settings, going_on)?,
             Some(_) => None,
         };
         match made {
             Some(made) => Ok(made.into_iter().map(|found| self.reported(found)).collect()),
-            None => measurements.par_iter().map(|measured| self.reconstruct(measured)).collect(),
+            None => each(self, measurements, going_on),
         }
     }
 

@@ -2,12 +2,11 @@
 
 use crate::Measurements;
 use crate::reconstruct::kind::regularised_kind;
-use crate::reconstruct::stack::with_statistics;
+use crate::reconstruct::stack::{each, with_statistics};
 use crate::reconstruct::{
-    MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction, Recursive,
+    GoingOn, MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction, Recursive,
     RecursiveSettings, Regularised, RegularisedSettings, Report, fused_frame, regularised,
 };
-use rayon::prelude::*;
 
 struct Penalised {
     name: &'static str,
@@ -55,11 +54,12 @@ impl Reconstruct for Penalised {
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
         let measurements = &with_statistics(measurements);
-        match regularised_kind(measurements, &self.settings)? {
+        match regularised_kind(measurements, &self.settings, going_on)? {
             Some(made) => Ok(made.into_iter().map(|found| self.reported(found)).collect()),
-            None => measurements.par_iter().map(|measured| self.reconstruct(measured)).collect(),
+            None => each(self, measurements, going_on),
         }
     }
 

@@ -3,12 +3,11 @@
 use crate::Measurements;
 use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::prior::{SharedNetwork, network_kind, with_network};
-use crate::reconstruct::stack::with_common_noise;
+use crate::reconstruct::stack::{each, with_common_noise};
 use crate::reconstruct::{
-    Method, Reconstruct, ReconstructError, Reconstruction, Recursive, RecursiveSettings,
+    GoingOn, Method, Reconstruct, ReconstructError, Reconstruction, Recursive, RecursiveSettings,
     believed_frame,
 };
-use rayon::prelude::*;
 
 const NAME: &str = "learned prior";
 
@@ -43,11 +42,12 @@ impl Reconstruct for Prior {
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
         let measurements = &with_common_noise(measurements);
-        match network_kind(measurements, &self.network, NAME)? {
+        match network_kind(measurements, &self.network, NAME, going_on)? {
             Some(made) => Ok(made),
-            None => measurements.par_iter().map(|measured| self.reconstruct(measured)).collect(),
+            None => each(self, measurements, going_on),
         }
     }
 

@@ -3,8 +3,8 @@
 use super::penalised;
 use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::{
-    MatrixMethod, Method, MethodSettings, Penalty, Reconstruct, ReconstructError, Reconstruction,
-    Recursive, RecursiveFrame, RecursiveSettings, Report,
+    GoingOn, MatrixMethod, Method, MethodSettings, Penalty, Reconstruct, ReconstructError,
+    Reconstruction, Recursive, RecursiveFrame, RecursiveSettings, Report,
 };
 use crate::{Basis, Measurements};
 
@@ -51,8 +51,9 @@ impl Reconstruct for Tikhonov {
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        self.alone.reconstruct_kind(measurements)
+        self.alone.reconstruct_kind(measurements, going_on)
     }
 
     fn begin_video(&self) -> Result<Option<Recursive>, ReconstructError> {

@@ -5,7 +5,7 @@ use super::{
     Seen, SharedNetwork, believe, completable, image, support, with_network, without_each,
 };
 use crate::Measurements;
-use crate::reconstruct::stack::sample;
+use crate::reconstruct::kind::{GoingOn, sample};
 use crate::reconstruct::weight::KindWeights;
 use crate::reconstruct::{HeldBack, ReconstructError, Reconstruction, Report, noise};
 use rayon::prelude::*;
@@ -23,6 +23,7 @@ pub(in super::super) fn network_kind(
     measurements: &[Measurements],
     network: &SharedNetwork,
     name: &str,
+    going_on: GoingOn<'_>,
 ) -> Result<Option<Vec<Reconstruction>>, ReconstructError> {
     let network = network.get();
     let Some(first) = measurements.first() else { return Ok(Some(Vec::new())) };
@@ -65,6 +66,7 @@ pub(in super::super) fn network_kind(
     }
     let held_back = HeldBack::mean(&judged);
     let made = |measured: &Measurements| {
+        going_on()?;
         let Ok(seen) = completable(measured) else {
             return with_network(measured, network, name);
         };
