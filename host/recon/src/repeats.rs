@@ -76,21 +76,23 @@ pub(crate) fn noise_of_repeats(measurements: &[Measurements]) -> Option<f64> {
     for (one, next) in pairs() {
         // A cut between two scenes is no repetition.
         if correlation(coarse, one, next) >= SAME_SCENE {
-            repeats.add(one.iter().zip(next).map(|(one, next)| next - one), 0.5);
+            // Another gain or lamp is no noise.
+            let gain = product(coarse, one, next) / product(coarse, one, one);
+            let differences = one.iter().zip(next).map(|(one, next)| next - gain * one);
+            repeats.add(differences, 1.0 / (1.0 + gain * gain));
         }
     }
     repeats.noise()
 }
 
+fn product(positions: &[usize], one: &[f64], next: &[f64]) -> f64 {
+    positions.iter().map(|&k| one[k] * next[k]).sum()
+}
+
 /// Correlation of two readings at these positions, around 0.
 fn correlation(positions: &[usize], one: &[f64], next: &[f64]) -> f64 {
-    let (mut both, mut first, mut second) = (0.0, 0.0, 0.0);
-    for &k in positions {
-        both += one[k] * next[k];
-        first += one[k] * one[k];
-        second += next[k] * next[k];
-    }
-    if first > 0.0 && second > 0.0 { both / (first * second).sqrt() } else { 0.0 }
+    let energies = product(positions, one, one) * product(positions, next, next);
+    if energies > 0.0 { product(positions, one, next) / energies.sqrt() } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -109,6 +111,14 @@ mod tests {
             (0..20).map(|seed| noisy(&rows(), &scene(side(32), 1), 5.0, seed)).collect();
         let found = noise_of_repeats(&still).unwrap();
         assert!((found / 5.0 - 1.0).abs() < 0.05, "{found}");
+        // A lamp that drifts.
+        let brighter = |seed: u64| {
+            let bright: Vec<f64> =
+                scene(side(32), 1).iter().map(|v| v * (1.0 + 0.03 * seed as f64)).collect();
+            noisy(&rows(), &bright, 5.0, seed)
+        };
+        let found = noise_of_repeats(&(0..20).map(brighter).collect::<Vec<_>>()).unwrap();
+        assert!((found / 5.0 - 1.0).abs() < 0.08, "{found}");
         // A figure that moves by a pixel every other frame, and a cut to another scene.
         let moving = (0..10).map(|k| noisy(&rows(), &figure(side(32), 0, k / 2), 5.0, k as u64));
         let cut: Vec<Measurements> = moving.chain(still.iter().cloned()).collect();

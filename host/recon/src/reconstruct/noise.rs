@@ -73,6 +73,14 @@ pub(super) fn estimated(measurements: &Measurements) -> Kind {
     Kind { noise: f64::from(noise) * largest, falloff }
 }
 
+/// An upper bound of the noise of one measurement.
+pub(super) fn most(measurements: &Measurements) -> f64 {
+    // Such values are far from the limits of 32-bit floats, as in `estimated`.
+    let largest = measurements.values().iter().fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+    let values: Vec<f32> = measurements.values().iter().map(|v| (v / largest) as f32).collect();
+    f64::from(SLACK * of_the_quiet(measurements.rows(), &values)) * largest
+}
+
 /// What readings say of their noise and of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Statistics {

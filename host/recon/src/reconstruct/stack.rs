@@ -9,7 +9,7 @@
 //! of two of the middle one. Measurements of other sizes are made by themselves, and so are kinds of
 //! fewer than [`LEAST`] measurements. What is found out is that of a [sample](super::kind::SAMPLE), evenly chosen: the
 //! mean falloff, and the noise: that by which repeated measurements of one scene differ
-//! ([`Repeats`](crate::Repeats)), else the middle one of the sample. It is found out anew every [`AT_A_TIME`] measurements, so that a
+//! ([`Repeats`](crate::Repeats)), but no more than each can have, else the middle one of the sample. It is found out anew every [`AT_A_TIME`] measurements, so that a
 //! long recording may change, and takes no more memory than a short one.
 //!
 //! # Invariant
@@ -139,9 +139,16 @@ pub(super) fn with_statistics(measurements: &[Measurements]) -> Vec<Measurements
     let some: Vec<usize> = sample(measurements.len()).collect();
     let found: Vec<Kind> = some.par_iter().map(|&k| noise::estimated(&measurements[k])).collect();
     let falloff = found.iter().map(|kind| kind.falloff).sum::<f64>() / found.len() as f64;
-    let mut noises: Vec<f64> = found.iter().map(|kind| kind.noise).collect();
-    noises.sort_unstable_by(f64::total_cmp);
-    let noise = noise_of_repeats(measurements).unwrap_or(noises[noises.len() / 2]);
+    let middle = |mut of_some: Vec<f64>| {
+        of_some.sort_unstable_by(f64::total_cmp);
+        of_some[of_some.len() / 2]
+    };
+    // Like scenes that are not the same differ by more than noise.
+    let most = || middle(some.iter().map(|&k| noise::most(&measurements[k])).collect());
+    let noise = match noise_of_repeats(measurements) {
+        Some(noise) => noise.min(most()),
+        None => middle(found.iter().map(|kind| kind.noise).collect()),
+    };
     let kind = Kind { noise, falloff };
     measurements.iter().cloned().map(|measured| measured.of_kind(kind)).collect()
 }
