@@ -2,7 +2,7 @@
 //!
 //! # Invariant
 //! Columns are those of the dictionary, bit for bit
-//! (`tests::a_column_is_computed_once_and_is_the_dictionarys`).
+//! (`tests::a_column_is_computed_once_and_is_that_of_the_dictionary`).
 
 use super::dictionary::{Atoms, Dictionary, padded};
 use super::scalar::Scalar;
@@ -67,7 +67,7 @@ mod tests {
     use crate::testing::side;
 
     #[test]
-    fn a_column_is_computed_once_and_is_the_dictionarys() {
+    fn a_column_is_computed_once_and_is_that_of_the_dictionary() {
         let (transform, prior) = (Transform::new(Basis::Dct, side(8)), Prior::none(64));
         let rows: Vec<u32> = (0..64).filter(|row| row % 3 != 1).collect();
         let plain = SampledHadamard::new(&transform, &rows, &prior);
