@@ -172,6 +172,11 @@ pub fn file_images(
     let made = solver.solve_all(file, &sources, is_video)?;
     let image = |(index, (source, solved)): (usize, (Source, Solved))| {
         let Solved { image, with_readings, parts, used, order, report } = solved;
+        // The frames of one recording lack the same, and are judged together.
+        let warnings = match index {
+            0 => all_warnings(&source, &report),
+            _ => source.warnings.clone(),
+        };
         FileImage {
             file: file.to_owned(),
             index: several.then_some(index),
@@ -184,12 +189,21 @@ pub fn file_images(
             report,
             outliers: source.outliers.iter().map(OutlierReport::of).collect(),
             notes: losses(&source).chain(source.notes.iter().cloned()).collect(),
-            // The frames of one recording lack the same.
-            warnings: if index == 0 { source.all_warnings() } else { source.warnings },
+            warnings,
             taken: source.taken,
         }
     };
     Ok(sources.into_iter().zip(made).enumerate().map(image).collect())
+}
+
+/// What a user must know of an image: of its readings, and whether they belong to their patterns.
+pub(super) fn all_warnings(source: &Source, report: &MethodReport) -> Vec<String> {
+    let mut warnings = source.all_warnings();
+    // A named form of the readings says more.
+    if source.warnings.is_empty() {
+        warnings.extend(report.doubt(&source.measurements));
+    }
+    warnings
 }
 
 /// The readings that a measurement lacks, in words.
@@ -212,8 +226,12 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn solver() -> Solver {
+        solver_of(Method::HADAMARD)
+    }
+
+    fn solver_of(method: Method) -> Solver {
         Solver::new(Recipe {
-            method: Method::HADAMARD,
+            method,
             settings: MethodSettings::default(),
             dictionary: None,
             first: FirstPatterns::Recorded,
@@ -266,5 +284,27 @@ mod tests {
         assert!(made.skipped[0].reason.contains("no such file"), "{:?}", made.skipped);
         assert!(made.skipped[1].reason.contains("images of 4 x 4, expected 8 x 8"));
         assert!(made.skipped.iter().all(|skipped| !skipped.reason.contains('\n')));
+    }
+
+    #[test]
+    fn a_stack_whose_readings_belong_to_other_patterns_is_doubted_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let solver = solver_of(Method::TIKHONOV);
+        let doubts = |value: fn(usize) -> f64| -> Vec<usize> {
+            let path = folder.path().join("stack.csv");
+            let mut text = "n,h_row,d\n".to_owned();
+            (0..256).for_each(|row| writeln!(text, "16,{row},{}", value(row)).unwrap());
+            std::fs::write(&path, text).unwrap();
+            let read = || Source::read(&path, &SourceOptions::default()).unwrap();
+            let sources = (0..10).map(|_| read()).collect();
+            let images = file_images(&path, sources, &solver, false).unwrap();
+            let is_doubt = |warning: &&String| warning.contains("no better than chance");
+            images.iter().map(|image| image.warnings.iter().filter(is_doubt).count()).collect()
+        };
+        // Readings of no scene, and those of a bright corner.
+        let mut once = vec![0; 10];
+        once[0] = 1;
+        assert_eq!(doubts(|row| ((row * 7919 + 13) % 101) as f64 - 50.0), once);
+        assert_eq!(doubts(|row| if row & 0x88 == 0 { 64.0 } else { 0.0 }), vec![0; 10]);
     }
 }

@@ -1,5 +1,6 @@
 //! One image, its pictures and its report, in a folder.
 
+use super::many::all_warnings;
 use super::{Solved, Solver, SolverError, not_read_words};
 use crate::account::LossCounters;
 use crate::files::output::OutputDir;
@@ -169,11 +170,7 @@ pub fn one_image(
     } else {
         (None, None)
     };
-    let mut warnings = source.all_warnings();
-    // A named form of the readings says more.
-    if source.warnings.is_empty() {
-        warnings.extend(method.doubt(&source.measurements));
-    }
+    let warnings = all_warnings(&source, &method);
     let unit = Unit::of_readings(source.frames.is_some());
     let short = enhancement.as_ref().map(|enhancement| enhancement.short.clone());
     let dropouts = source.dropouts.into_iter().map(|d| DropoutReport {
