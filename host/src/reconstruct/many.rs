@@ -68,10 +68,15 @@ pub struct ManyImages {
 }
 
 impl ManyImages {
-    /// Where the readings of all images come from, as far as these have it in common. `named` is the
-    /// folder, or the first file.
+    /// Where the readings of all images come from, as far as these have it in common: for images of one
+    /// file, all that is known of it. `named` is the folder, or the first of several files.
     #[must_use]
     pub fn taken(&self, named: &Path) -> Taken {
+        if let Some(first) = self.images.first()
+            && self.images.iter().all(|image| image.file == first.file)
+        {
+            return first.taken.clone();
+        }
         let simulated = self.images.first().and_then(|image| image.taken.simulated());
         let all = self.images.iter().all(|image| image.taken.simulated() == simulated);
         Taken::of_file(named, simulated.filter(|_| all))
