@@ -20,6 +20,11 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// The suffix that NumPy appends to the name of an array.
 const MEMBER_SUFFIX: &str = ".npy";
+/// Members of other files that are zip archives, and what to do with these files.
+const OTHERS: [(&str, &str); 2] = [
+    ("xl/workbook.xml", "a workbook of Excel (save it as CSV)"),
+    ("content.xml", "a spreadsheet of OpenDocument (save it as CSV)"),
+];
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
 const MAX_FIELD_BYTES: u64 = 256 << 20;
@@ -59,8 +64,14 @@ impl Archive {
         let zip = ZipArchive::new(BufReader::new(file))
             .map_err(|error| damaged(path, error.to_string()))?;
         // A field of nirspi always has a name in UTF-8, so other names are skipped.
-        let members = zip.file_names().flatten();
+        let members: Vec<String> = zip.file_names().flatten().map(Into::into).collect();
+        if let Some((_, kind)) =
+            OTHERS.iter().find(|(member, _)| members.iter().any(|name| name == member))
+        {
+            return Err(FileError::kind(path, *kind, EXPECTED));
+        }
         let mut names: Vec<String> = members
+            .iter()
             .filter_map(|name| name.strip_suffix(MEMBER_SUFFIX).map(str::to_owned))
             .collect();
         names.sort_unstable();

@@ -31,6 +31,8 @@ pub(super) struct Fields {
     path: PathBuf,
     names: Vec<String>,
     format: Format,
+    /// What a text has beside its table and is left out, in one line.
+    skipped: Option<String>,
 }
 
 enum Format {
@@ -53,6 +55,7 @@ impl Fields {
             .take(START_BYTES)
             .read_to_end(&mut start)
             .map_err(|error| FileError::io(path, "read", error))?;
+        let mut skipped = None;
         let (names, format) = if start.starts_with(b"PK") {
             let archive = Archive::open(path)?;
             (archive.names().to_vec(), Format::Npz(archive))
@@ -64,7 +67,9 @@ impl Fields {
             let mat = Mat::open(path, whole(path, length, "a MATLAB file")?)?;
             (mat.names(), Format::Mat(mat))
         } else if text::is_start(&start) {
-            match text::read(path, decimal_comma)? {
+            let text = text::read(path, decimal_comma)?;
+            skipped = text.skipped;
+            match text.numbers {
                 text::Numbers::Columns(columns) => {
                     let (names, fields) = columns.into_iter().unzip();
                     (names, Format::Columns(fields))
@@ -77,11 +82,16 @@ impl Fields {
         if decimal_comma && !matches!(format, Format::Columns(_) | Format::Unnamed(_)) {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
-        Ok(Self { path: path.to_owned(), names, format })
+        Ok(Self { path: path.to_owned(), names, format, skipped })
     }
 
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// What a text has beside its table and is left out, in one line.
+    pub(super) fn skipped(&self) -> Option<&str> {
+        self.skipped.as_deref()
     }
 
     /// Names of all fields.

@@ -9,13 +9,29 @@
 //! as in `0,05` or `1,5E-3`; some numbers of a line have commas and others have none. One comma a
 //! line, under a heading with one comma, separates two columns.
 
+mod export;
+
 use super::FileError;
 use super::field::{EXPECTED, Field};
 use super::plain::{is_heading, read_large_text, start_of_text};
 use std::path::Path;
 
 /// Words for a reading that was not taken.
-const UNREAD: [&str; 4] = ["nan", "null", "na", "none"];
+const UNREAD: [&str; 10] =
+    ["nan", "null", "na", "none", "#n/a", "n/a", "#num!", "-1.#ind", "1.#qnan", "-nan"];
+
+/// Words for a reading beyond what an instrument measures.
+const OVERLOADED: [&str; 5] = ["∞", "+∞", "ol", "ovld", "overload"];
+
+/// What instruments write themselves for such a reading.
+const OVERLOAD: f64 = 9.9e37;
+
+/// What a text file holds.
+pub(super) struct Text {
+    pub(super) numbers: Numbers,
+    /// What was left out, in one line.
+    pub(super) skipped: Option<String>,
+}
 
 /// The numbers of a text file.
 pub(super) enum Numbers {
@@ -28,22 +44,49 @@ pub(super) enum Numbers {
 /// Whether a file with these first bytes is text.
 pub(super) fn is_start(start: &[u8]) -> bool {
     let text = &*start_of_text(start);
+    // Beside letters and digits; pandas leaves the name of its first column empty.
+    const BEGIN: &[u8] = b"#+-.\"%_,;([";
     !text.is_empty() && text.iter().all(|&b| b >= b' ' && b != 0x7f || b"\t\r\n".contains(&b)) && {
         let first = text.iter().position(|b| !b.is_ascii_whitespace());
-        first.is_some_and(|at| text[at].is_ascii_alphanumeric() || b"#+-.\"%_".contains(&text[at]))
+        first.is_some_and(|at| text[at].is_ascii_alphanumeric() || BEGIN.contains(&text[at]))
     }
 }
 
-/// Reads a file. With `decimal_comma`, every comma is a decimal comma.
-pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Numbers, FileError> {
+/// Reads a file. With `decimal_comma`, every comma is a decimal comma. A text that is no plain table may
+/// [have one in it](export).
+pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Text, FileError> {
     let text = read_large_text(path, EXPECTED)?;
+    // Lines that end as on an old Macintosh.
+    let text = if text.contains('\n') { text } else { text.replace('\r', "\n") };
     let lines: Vec<(usize, &str)> = text
         .lines()
         .enumerate()
         // A tab at the end of a line may close an empty cell.
         .map(|(at, line)| (at + 1, line.trim_start().trim_end_matches([' ', '\r'])))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', '%']))
+        // Spreadsheets tell each other the separator.
+        .filter(|&(at, line)| at > 1 || !line.to_ascii_lowercase().starts_with("sep="))
         .collect();
+    let refused = match plain(path, &lines, decimal_comma) {
+        Ok(numbers) => return Ok(Text { numbers, skipped: None }),
+        Err(error) => error,
+    };
+    let Some(found) = export::find(path, &lines, decimal_comma) else { return Err(refused) };
+    let export::Found { columns, names, skipped } = found?;
+    let numbers = match names {
+        Some(names) => Numbers::Columns(names.into_iter().zip(columns).collect()),
+        None => {
+            let (height, width) = (columns[0].real.len(), columns.len());
+            let row = |at: usize| columns.iter().map(move |column| column.real[at]);
+            let real = (0..height).flat_map(row).collect();
+            Numbers::Table(Field { shape: vec![height, width], real, imaginary: None })
+        }
+    };
+    Ok(Text { numbers, skipped: Some(skipped) })
+}
+
+/// The numbers of a plain table: a heading if there is one, and lines of numbers.
+fn plain(path: &Path, lines: &[(usize, &str)], decimal_comma: bool) -> Result<Numbers, FileError> {
     let wrong = |line: usize, found: String, expected: &str| {
         FileError::field(path, "table", format!("has {found} in line {line}"), expected)
     };
@@ -53,7 +96,7 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Numbers, FileErro
     };
     let (heading, body) = match lines.split_first() {
         Some((first, body)) if names_columns(first) => (Some(first.1), body),
-        _ => (None, &lines[..]),
+        _ => (None, lines),
     };
     if body.is_empty() {
         return Err(FileError::kind(path, "a text file without numbers", EXPECTED));
@@ -183,12 +226,32 @@ impl Separators {
     }
 }
 
-/// The number that a word states; NaN for a reading that was not taken.
+/// The number that a word states, with the point or comma of its decimals; NaN for a reading that was not
+/// taken, 9.9e37 for one beyond what an instrument measures.
 fn parse(word: &str, decimal: char) -> Option<f64> {
     let word = word.trim_matches('"');
-    if word.is_empty() || UNREAD.contains(&word.to_ascii_lowercase().as_str()) {
+    if let Some(number) = plain_number(word, decimal) {
+        return Some(number);
+    }
+    let lower = word.to_lowercase();
+    if word.is_empty() || UNREAD.contains(&lower.as_str()) {
         return Some(f64::NAN);
     }
+    if OVERLOADED.contains(&lower.as_str()) {
+        return Some(OVERLOAD);
+    }
+    if lower == "-∞" || lower == "−∞" {
+        return Some(-OVERLOAD);
+    }
+    // What NumPy 2 prints, and Fortran's exponents.
+    let printed = ["np.float64(", "np.float32(", "np.int64("].iter();
+    let inner = printed.filter_map(|by| lower.strip_prefix(by)?.strip_suffix(')')).next();
+    let plain = inner.unwrap_or(&lower).replace('−', "-");
+    let is_exponent = plain.contains(|c: char| c.is_ascii_digit()) && plain.contains('d');
+    plain_number(&if is_exponent { plain.replacen('d', "e", 1) } else { plain }, decimal)
+}
+
+fn plain_number(word: &str, decimal: char) -> Option<f64> {
     match decimal {
         '.' => word.parse().ok(),
         _ if word.contains('.') => None,
@@ -207,7 +270,7 @@ mod tests {
 
     fn table(content: &str) -> (Vec<usize>, Vec<f64>) {
         let (_folder, path) = file("y.txt", content.as_bytes());
-        match read(&path, false).unwrap() {
+        match read(&path, false).unwrap().numbers {
             Numbers::Table(field) => (field.shape, field.real),
             Numbers::Columns(columns) => panic!("{columns:?}"),
         }
@@ -225,7 +288,7 @@ mod tests {
         // A byte that is not valid UTF-8, as in a heading of another code page.
         let (_folder, path) = file("y.txt", b"U in \xb5V\n1\n2\n");
         assert!(
-            matches!(read(&path, false), Ok(Numbers::Table(field)) if field.real == [1.0, 2.0])
+            matches!(read(&path, false).unwrap().numbers, Numbers::Table(field) if field.real == [1.0, 2.0])
         );
     }
 
@@ -249,19 +312,38 @@ mod tests {
         let (_folder, path) = file("y.txt", b"1,5\n2,5\n");
         let message = line(&read(&path, false).err().unwrap(), "y.txt");
         assert!(message.contains("one comma a line") && message.contains("--decimal-comma"));
-        let Numbers::Table(field) = read(&path, true).unwrap() else { panic!("a table") };
+        let Numbers::Table(field) = read(&path, true).unwrap().numbers else { panic!("a table") };
         assert_eq!(field.real, [1.5, 2.5]);
         let (_folder, path) = file("y.csv", b"h_row,d\n0,15\n3,-4\n");
-        let Numbers::Columns(columns) = read(&path, false).unwrap() else { panic!("columns") };
+        let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else {
+            panic!("columns")
+        };
         assert_eq!(columns[1].1.real, [15.0, -4.0]);
         let (_folder, path) = file("y.txt", b"1,5;2.5\n");
         assert!(line(&read(&path, false).err().unwrap(), "y.txt").contains("points and commas"));
     }
 
     #[test]
+    fn numbers_are_read_however_programs_print_them() {
+        let printed = "np.float64(1.5)\nnp.float64(-2)\n1.25D+01\n\u{2212}3\n";
+        assert_eq!(table(printed).1, [1.5, -2.0, 12.5, -3.0]);
+        let (_, found) =
+            table("1\n#N/A\n-1.#IND\nOL\n-\u{221e}\n".replace("\n#", "\n\"#").as_str());
+        assert!(found[1].is_nan() && found[2].is_nan(), "{found:?}");
+        assert_eq!([found[0], found[3], found[4]], [1.0, OVERLOAD, -OVERLOAD]);
+        assert_eq!(table("1.5\r2.5\r").1, [1.5, 2.5]);
+        assert_eq!(table("sep=;\n1,5;2\n3;4,5\n").1, [1.5, 2.0, 3.0, 4.5]);
+        let (_folder, path) = file("y.csv", b",y\n0,1.5\n1,2.5\n");
+        let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else { panic!() };
+        assert_eq!((&*columns[1].0, &columns[1].1.real), ("y", &vec![1.5, 2.5]));
+    }
+
+    #[test]
     fn a_heading_names_the_columns_and_words_for_unread_are_nan() {
         let (_folder, path) = file("y.csv", b"h_row; d\n0;1,5\n3;null\n2;\n1;NaN\n");
-        let Numbers::Columns(columns) = read(&path, false).unwrap() else { panic!("columns") };
+        let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else {
+            panic!("columns")
+        };
         assert_eq!([&columns[0].0, &columns[1].0], ["h_row", "d"]);
         assert_eq!(columns[0].1.real, [0.0, 3.0, 2.0, 1.0]);
         let d = &columns[1].1.real;

@@ -56,7 +56,7 @@ impl Opened {
         let is_d = name == "d";
         let default = if name == "d" { Form::Differences } else { Form::Pairs };
         let form = want.form.unwrap_or(default);
-        let mut notes = Vec::new();
+        let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
         let side_guessed = side.is_none();
         let (side, mut rows, readings) = match &want.shown {
             None => {

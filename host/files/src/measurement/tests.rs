@@ -447,6 +447,26 @@ fn a_changed_reading_is_caught_by_the_checksum() {
     assert!(line.contains("damaged or cut short (`y`: Invalid checksum)"), "{line}");
 }
 
+#[test]
+fn a_workbook_is_told_apart_from_an_archive_of_arrays() {
+    for (member, kind) in [("xl/workbook.xml", "Excel"), ("content.xml", "OpenDocument")] {
+        let bytes = zip(Zip::Stored, &[(member, b"<x/>".to_vec())]);
+        let line = line(&read_bytes(&bytes, &as_is()).unwrap_err(), "lab.npz");
+        assert!(line.contains(kind) && line.contains("save it as CSV"), "{line}");
+    }
+}
+
+#[test]
+fn what_is_left_out_of_a_text_is_a_note() {
+    let rows = (0..16).map(|row| format!("4,{row},{}.5,ok\n", 20 - row)).collect::<String>();
+    let (_guard, path) = file("log.csv", format!("a bench\nn,h_row,d,word\n{rows}").as_bytes());
+    let found = read(&path, &as_is()).unwrap();
+    let Readings::Differential(d) = &found.readings else { panic!("{:?}", found.readings) };
+    assert!(d.iter().eq((0..16).map(|row| f64::from(20 - row) + 0.5).collect::<Vec<_>>().iter()));
+    let told = "left out of the text: 1 line before the table; columns without numbers: `word`";
+    assert_eq!(found.notes, [told]);
+}
+
 proptest! {
     #[test]
     fn damage_is_harmless_or_refused(

@@ -1,0 +1,276 @@
+//! A table among other lines, as instruments and programs export it: with lines before and after it,
+//! a line of units, and columns of words.
+//!
+//! # Invariant
+//! No number of a table is lost in silence: what is left out is no line of numbers like those of the
+//! table, and is told (`tests::a_table_with_a_gap_is_refused_as_before`).
+
+use super::{Separators, parse, shortened};
+use crate::FileError;
+use crate::field::Field;
+use nirspi_recon::words::count_of;
+use std::path::Path;
+
+/// The fewest lines of such a table. Fewer may be anything.
+const LEAST_LINES: usize = 8;
+
+/// The most lines before the table, and after it.
+const MOST_BEFORE: usize = 64;
+const MOST_AFTER: usize = 3;
+
+/// Words for units below a heading, in brackets or without.
+const UNITS: [&str; 20] = [
+    "s", "ms", "us", "ns", "sec", "second", "seconds", "v", "mv", "uv", "volt", "volts", "a", "ma",
+    "w", "mw", "hz", "db", "sequence", "counts",
+];
+
+/// A table, and what was left out.
+pub(super) struct Found {
+    pub columns: Vec<Field>,
+    pub names: Option<Vec<String>>,
+    pub skipped: String,
+}
+
+/// A line and its number.
+type Line<'t> = (usize, &'t str);
+
+/// The table in these lines; `None` if there is none, or none for sure.
+pub(super) fn find(
+    path: &Path,
+    lines: &[Line<'_>],
+    decimal_comma: bool,
+) -> Option<Result<Found, FileError>> {
+    let body = longest(lines)?;
+    let (before, after) = (&lines[..body.start], &lines[body.end..]);
+    if before.len() > MOST_BEFORE || after.len() > MOST_AFTER {
+        return None;
+    }
+    let body = &lines[body];
+    let above = before.last().map(|(_, line)| *line);
+    let separators = match Separators::of(path, above, body, decimal_comma) {
+        Ok(separators) => separators,
+        Err(error) => return Some(Err(error)),
+    };
+    let rows: Vec<Vec<&str>> =
+        body.iter().map(|(_, line)| cells(line, separators.between)).collect();
+    let width = rows[0].len();
+    if rows.iter().any(|row| row.len() != width) {
+        return None;
+    }
+    let number = |word: &str| parse(word, separators.decimal);
+    let numeric: Vec<usize> = (0..width).filter(|&at| is_numeric(&rows, at, number)).collect();
+    let is_row =
+        |row: &[&str]| row.len() == width && numeric.iter().all(|&at| number(row[at]).is_some());
+    let outside = before.iter().chain(after).map(|(_, line)| cells(line, separators.between));
+    if numeric.is_empty() || outside.into_iter().any(|row| is_row(&row)) {
+        return None;
+    }
+    // A last line of totals.
+    let rows_end = rows.iter().rposition(|row| is_row(row)).map_or(0, |last| last + 1);
+    let ends = rows.len() - rows_end;
+    if ends > MOST_AFTER || rows_end < LEAST_LINES {
+        return None;
+    }
+    let wrong = |line: usize, word: &str| {
+        let found = format!("has {:?} in line {line}", shortened(word));
+        FileError::field(path, "table", found, "a number")
+    };
+    let mut columns = vec![Vec::with_capacity(rows_end); numeric.len()];
+    for ((line, _), row) in body.iter().zip(&rows[..rows_end]) {
+        for (column, &at) in columns.iter_mut().zip(&numeric) {
+            match number(row[at]) {
+                Some(value) => column.push(value),
+                None => return Some(Err(wrong(*line, row[at]))),
+            }
+        }
+    }
+    let (heading, units) = heading(before, separators.between, &numeric, number);
+    let named = |heading: &Vec<&str>, at: usize| heading[at].trim_matches('"').trim().to_owned();
+    let words: Vec<String> = (0..width)
+        .filter(|at| !numeric.contains(at) && rows.iter().any(|row| !row[*at].is_empty()))
+        .map(|at| match heading.as_ref().filter(|heading| at < heading.len()) {
+            Some(heading) => format!("`{}`", shortened(&named(heading, at))),
+            None => format!("{}", at + 1),
+        })
+        .collect();
+    let headed = usize::from(heading.is_some()) + usize::from(units);
+    let mut skipped = Vec::new();
+    if before.len() > headed {
+        let count = count_of(before.len() - headed, "line");
+        skipped.push(format!("{count} before the table"));
+    }
+    if units {
+        skipped.push("the units below its heading".to_owned());
+    }
+    if !words.is_empty() {
+        skipped.push(format!("columns without numbers: {}", words.join(", ")));
+    }
+    if after.len() + ends > 0 {
+        skipped.push(format!("{} after it", count_of(after.len() + ends, "line")));
+    }
+    let names = heading.map(|heading| numeric.iter().map(|&at| named(&heading, at)).collect());
+    let field = |real: Vec<f64>| Field { shape: vec![real.len()], real, imaginary: None };
+    let columns = columns.into_iter().map(field).collect();
+    let skipped = format!("left out of the text: {}", skipped.join("; "));
+    Some(Ok(Found { columns, names, skipped }))
+}
+
+/// The longest run of lines with the same number of cells, some of them numbers.
+fn longest(lines: &[Line<'_>]) -> Option<std::ops::Range<usize>> {
+    let mut best = 0..0;
+    for between in [Some(';'), Some('\t'), Some(','), None] {
+        let shape = |(_, line): &Line<'_>| {
+            let cells = cells(line, between);
+            let is_number = |word: &&str| {
+                !word.is_empty() && (parse(word, '.').is_some() || parse(word, ',').is_some())
+            };
+            (cells.len(), cells.iter().any(is_number))
+        };
+        let shapes: Vec<(usize, bool)> = lines.iter().map(shape).collect();
+        let mut start = 0;
+        for run in shapes.chunk_by(|a, b| a == b) {
+            if run[0].1 && run.len() > best.len() {
+                best = start..start + run.len();
+            }
+            start += run.len();
+        }
+    }
+    (best.len() >= LEAST_LINES).then_some(best)
+}
+
+/// Whether at least half of a column's cells are numbers.
+fn is_numeric(rows: &[Vec<&str>], at: usize, number: impl Fn(&str) -> Option<f64>) -> bool {
+    let numbers = rows.iter().filter(|row| !row[at].is_empty() && number(row[at]).is_some());
+    2 * numbers.count() >= rows.len()
+}
+
+/// The names of the columns, in the line before the table or in that before a line of units; and whether
+/// there are units.
+fn heading<'t>(
+    before: &[Line<'t>],
+    between: Option<char>,
+    numeric: &[usize],
+    number: impl Fn(&str) -> Option<f64>,
+) -> (Option<Vec<&'t str>>, bool) {
+    let last = numeric.last().copied().unwrap_or(0);
+    let words = |(_, line): &Line<'t>| {
+        let cells = cells(line, between);
+        let are_words = cells.len() > last
+            && numeric.iter().all(|&at| cells[at].is_empty() || number(cells[at]).is_none())
+            && numeric.iter().any(|&at| !cells[at].is_empty());
+        are_words.then_some(cells)
+    };
+    let is_unit = |word: &str| {
+        let plain = word.trim_matches(['(', ')', '[', ']', '"', ' ']);
+        UNITS.contains(&plain.to_lowercase().as_str())
+    };
+    let mut above = before.iter().rev().map(words);
+    let Some(Some(nearest)) = above.next() else { return (None, false) };
+    let are_units = numeric.iter().all(|&at| is_unit(nearest[at]));
+    match above.next() {
+        Some(Some(names)) if are_units => (Some(names), true),
+        _ => (Some(nearest), false),
+    }
+}
+
+/// The cells of a line. A separator in quotes separates nothing.
+fn cells(line: &str, between: Option<char>) -> Vec<&str> {
+    let mut quoted = false;
+    let parts = line.split(|c: char| {
+        quoted ^= c == '"';
+        !quoted && between.map_or(c.is_whitespace(), |mark| c == mark)
+    });
+    parts.map(str::trim).filter(|word| between.is_some() || !word.is_empty()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Numbers, read};
+    use crate::testing::{file, line};
+    use std::fmt::Write;
+
+    /// The columns of a text by their names, and what was left out.
+    fn columns(content: &str) -> (Vec<(String, Vec<f64>)>, String) {
+        let (_folder, path) = file("y.csv", content.as_bytes());
+        let found = read(&path, false).unwrap();
+        let columns = match found.numbers {
+            Numbers::Columns(columns) => {
+                columns.into_iter().map(|(name, field)| (name, field.real)).collect()
+            }
+            Numbers::Table(field) => vec![(format!("{:?}", field.shape), field.real)],
+        };
+        (columns, found.skipped.unwrap_or_default())
+    }
+
+    fn rows(of: impl Fn(u32) -> String) -> String {
+        (0..9).fold(String::new(), |mut text, k| {
+            writeln!(text, "{}", of(k)).unwrap();
+            text
+        })
+    }
+
+    fn expected(name: &str, of: impl Fn(u32) -> f64) -> (String, Vec<f64>) {
+        (name.to_owned(), (0..9).map(of).collect())
+    }
+
+    #[test]
+    fn what_instruments_export_is_read_and_what_is_left_out_is_told() {
+        let y = |k: u32| 8.5 - f64::from(k);
+        let k = f64::from;
+        // Names with numbers in them.
+        let text = format!("time,Channel 1\n{}", rows(|k| format!("{k},{}", y(k))));
+        assert_eq!(columns(&text).0, [expected("time", k), expected("Channel 1", y)]);
+        // An oscilloscope: start and increment beside the units, a comma at the end of a line.
+        let text = format!(
+            "X,CH1,Start,Increment,\nSequence,Volt,-6e-04,1e-06\n{}",
+            rows(|k| format!("{k},{},", y(k)))
+        );
+        let (found, skipped) = columns(&text);
+        assert_eq!(found, [expected("X", k), expected("CH1", y)]);
+        assert_eq!(skipped, "left out of the text: the units below its heading");
+        // A power meter: lines of its own before the table, dates and times of day.
+        let text = format!(
+            "Power Monitor\nDevice:;PM1\nWavelength:;1550 nm\n\nSamples;Date;Time;Power (W)\n{}",
+            rows(|k| format!("{k};11/20/2026;10:00:0{k}.000;{}", y(k)))
+        );
+        let (found, skipped) = columns(&text);
+        assert_eq!(found, [expected("Samples", k), expected("Power (W)", y)]);
+        let told = "3 lines before the table; columns without numbers: `Date`, `Time`";
+        assert!(skipped.ends_with(told), "{skipped}");
+        // A serial monitor.
+        let (found, _) = columns(&rows(|k| format!("14:02:0{k}.000 -> {}", y(k))));
+        assert_eq!(found, [expected("[9, 1]", y)]);
+        // Quoted names with commas, a column of words, a line of totals.
+        let text = format!(
+            "\"d, V\",comment\n{}total,sum of 9\n",
+            rows(|k| format!("{},\"ok, {k}\"", y(k)))
+        );
+        let (found, skipped) = columns(&text);
+        assert_eq!(found, [expected("d, V", y)]);
+        assert!(skipped.ends_with("columns without numbers: `comment`; 1 line after it"));
+        // Units in brackets, infinity for overload, decimal commas.
+        let text = format!(
+            "Time;Channel A\n(ms);(V)\n0;∞\n{}",
+            rows(|k| format!("{};{}", k + 1, y(k).to_string().replace('.', ",")))
+        );
+        let (found, _) = columns(&text);
+        assert!(found[1].0 == "Channel A" && found[1].1[0] >= 9.9e37 && found[1].1[1] == 8.5);
+    }
+
+    #[test]
+    fn a_table_with_a_gap_is_refused_as_before() {
+        for wrong in [
+            // Lines of numbers that another line divides, before and behind.
+            format!("{}lost\n{}", rows(|k| format!("{k},1.5")), rows(|k| format!("{k},2.5"))),
+            format!("{}3,4,5\n1,2.5\n", rows(|k| format!("{k},1.5"))),
+            // A word in the middle of a column of numbers.
+            format!("a,b\n{}3,x\n{}", rows(|k| format!("{k},1.5")), rows(|k| format!("{k},2.5"))),
+            // More lines behind the table than a footer has.
+            format!("{}end\n of\nthe\nlog\n", rows(|k| format!("{k},1.5"))),
+        ] {
+            let (_folder, path) = file("y.csv", wrong.as_bytes());
+            let message = line(&read(&path, false).err().unwrap(), "y.csv");
+            assert!(message.contains("in line"), "{wrong}: {message}");
+        }
+    }
+}
