@@ -22,6 +22,7 @@ pub const LAWS: &[Law] = &[
             "host/files/src/mat.rs",
             "host/files/src/hdf5.rs",
             "host/files/src/text.rs",
+            "host/files/src/text/export.rs",
         ],
         holds: files,
         seeds: file_seeds,
@@ -250,9 +251,17 @@ fn file_seeds() -> Vec<Vec<u8>> {
         npy::encode(&[32], &readings),
         b"h_row;d\n0;1,5\n3;null\n2;\n1;NaN\n".to_vec(),
         readings.iter().map(|y| format!("{y}\n")).collect::<String>().into_bytes(),
+        exported(&readings),
         small("level5.mat"),
         small("level5_compressed.mat"),
     ]
+}
+
+/// A table as an instrument exports it, of four patterns.
+fn exported(readings: &[f64]) -> Vec<u8> {
+    let rows = readings.iter().take(9).enumerate();
+    let rows = rows.map(|(k, y)| format!("{};11/20/2026;{y}\n", k % 4)).collect::<String>();
+    format!("a meter\nh_row;Date;d\n(s);;(V)\n{rows}end\n").into_bytes()
 }
 
 fn field_seeds() -> Vec<Vec<u8>> {
