@@ -82,7 +82,7 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Text, FileError> 
             Numbers::Table(Field { shape: vec![height, width], real, imaginary: None })
         }
     };
-    Ok(Text { numbers, skipped: Some(skipped) })
+    Ok(Text { numbers, skipped })
 }
 
 /// The numbers of a plain table: a heading if there is one, and lines of numbers.

@@ -28,7 +28,8 @@ const UNITS: [&str; 20] = [
 pub(super) struct Found {
     pub columns: Vec<Field>,
     pub names: Option<Vec<String>>,
-    pub skipped: String,
+    /// One line; `None` if nothing was left out.
+    pub skipped: Option<String>,
 }
 
 /// A line and its number.
@@ -111,7 +112,8 @@ pub(super) fn find(
     let names = heading.map(|heading| numeric.iter().map(|&at| named(&heading, at)).collect());
     let field = |real: Vec<f64>| Field { shape: vec![real.len()], real, imaginary: None };
     let columns = columns.into_iter().map(field).collect();
-    let skipped = format!("left out of the text: {}", skipped.join("; "));
+    let told = || format!("left out of the text: {}", skipped.join("; "));
+    let skipped = (!skipped.is_empty()).then(told);
     Some(Ok(Found { columns, names, skipped }))
 }
 
@@ -219,7 +221,8 @@ mod tests {
         let k = f64::from;
         // Names with numbers in them.
         let text = format!("time,Channel 1\n{}", rows(|k| format!("{k},{}", y(k))));
-        assert_eq!(columns(&text).0, [expected("time", k), expected("Channel 1", y)]);
+        let named = vec![expected("time", k), expected("Channel 1", y)];
+        assert_eq!(columns(&text), (named, String::new()));
         // An oscilloscope: start and increment beside the units, a comma at the end of a line.
         let text = format!(
             "X,CH1,Start,Increment,\nSequence,Volt,-6e-04,1e-06\n{}",
