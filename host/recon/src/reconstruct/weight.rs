@@ -125,17 +125,16 @@ impl Bands {
     ) -> f64 {
         let mut sum = 0.0;
         for (band, of_band) in self.positions.chunks(self.each).zip(weights) {
-            let beside = 1.0 - (1.0 - of_band.reading) * of_band.follows;
             for &k in band {
                 let (value, sigma) = reading(k);
                 let predicted = &mut grid[rows[k] as usize];
-                let missed = value - *predicted;
+                let missed = (value - *predicted) * of_band.follows;
                 let weight = match (WITHIN * sigma).powi(2) / missed.powi(2) {
-                    beyond if beyond < 1.0 => beside.max(1.0 - beyond),
-                    _ => beside,
+                    beyond if beyond < 1.0 => of_band.reading.max(1.0 - beyond),
+                    _ => of_band.reading,
                 };
                 *predicted = value - (1.0 - weight) * missed;
-                sum += f64::from(1.0 - (1.0 - weight) / of_band.follows);
+                sum += f64::from(weight);
             }
         }
         if let Some(k) = self.all_ones {
@@ -270,6 +269,30 @@ mod tests {
             let expected = wrong * wrong / (noise * noise + wrong * wrong);
             assert!((weight - expected).abs() < 0.15, "{noise} {wrong}: {weight}, {expected}");
         }
+    }
+
+    #[test]
+    fn a_prediction_that_follows_its_readings_counts_as_one_made_without_them() {
+        let mut random = Pcg64::seed_from_u64(3);
+        let rows = rows().first(512);
+        let truth: Vec<f64> = rows.iter().map(|_| 10.0 * normal(&mut random)).collect();
+        let mut values = || -> Vec<f32> {
+            truth.iter().map(|t| (t + 2.0 * normal(&mut random)) as f32).collect()
+        };
+        let (readings, without) = (values(), values());
+        let follows = |k: usize| readings[k] - 0.4 * (readings[k] - without[k]);
+        let reading = |k: usize| (readings[k], 2.0);
+        let mut weights = KindWeights::new(&rows);
+        weights.add(reading, |k| without[k], follows);
+        let (mut with_own, mut alone) = (vec![0.0; 1024], vec![0.0; 1024]);
+        for (k, &row) in rows.iter().enumerate() {
+            (with_own[row as usize], alone[row as usize]) = (follows(k), without[k]);
+        }
+        let found = weights.weigh(&rows, reading, &mut with_own);
+        let expected = weigh(&rows, &readings, 2.0, &mut alone);
+        assert!((found - expected).abs() < 1e-4, "{found} {expected}");
+        let apart = with_own.iter().zip(&alone).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f32::max) < 1e-3);
     }
 
     #[test]
