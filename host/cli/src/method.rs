@@ -144,15 +144,6 @@ impl MethodArgs {
     pub fn prepare(&self, side: usize) -> Result<Box<dyn Reconstruct>> {
         Ok(self.method.prepare(&self.settings_for(side)?)?)
     }
-
-    /// The result of a method, in the form of the report.
-    pub fn solved(&self, made: reconstruct::Reconstruction, measurements: &Measurements) -> Solved {
-        Solved {
-            with_readings: made.with_readings(measurements),
-            image: made.image,
-            report: MethodReport { method: self.method, made: made.report },
-        }
-    }
 }
 
 /// An image and its report.
@@ -172,5 +163,9 @@ pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
         Some(path) => made.with_context(|| path.display().to_string())?,
         None => made?,
     };
-    Ok(args.solved(made, measurements))
+    Ok(Solved {
+        with_readings: made.with_readings(measurements),
+        image: made.image,
+        report: MethodReport { method: args.method, made: made.report },
+    })
 }

@@ -447,10 +447,14 @@ impl<'a> Problem<'a> {
         problem
     }
 
-    /// The same problem with other measurements of the same rows, whose noise is known.
-    fn read(&mut self, measurements: &'a Measurements) {
+    /// Takes other measurements of the same rows. Their noise is `noise`, or what is known of it.
+    fn read(&mut self, measurements: &'a Measurements, noise: NoiseLevel) {
         (self.values, self.unit) = in_units(measurements);
-        let noise = measurements.noise().or(measurements.kind().map(|kind| kind.noise));
+        let of_kind = || measurements.kind().map(|kind| kind.noise);
+        let noise = match noise {
+            NoiseLevel::Known(sigma) => Some(sigma),
+            NoiseLevel::Estimated => measurements.noise().or_else(of_kind),
+        };
         self.reading_noise =
             noise.map(|sigma| (sigma / self.side.pixels() as f64 / self.unit) as f32);
     }

@@ -21,7 +21,7 @@ pub struct Repeats {
 }
 
 impl Repeats {
-    /// Of so many patterns.
+    /// No differences yet, for this number of patterns.
     #[must_use]
     pub fn of(patterns: usize) -> Self {
         Self { squares: vec![0.0; patterns], pairs: 0 }

@@ -212,7 +212,7 @@ pub(super) fn all_warnings(source: &Source, report: &MethodReport) -> Vec<String
 }
 
 /// The readings that a measurement lacks, in words.
-pub fn losses(source: &Source) -> impl Iterator<Item = String> {
+fn losses(source: &Source) -> impl Iterator<Item = String> {
     let dropped = |lost: &nirspi_recon::Dropout| {
         format!("drop-out: {} from y[{}] on", count_of(lost.length, "reading"), lost.start)
     };

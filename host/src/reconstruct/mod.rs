@@ -8,7 +8,7 @@ mod solver;
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 mod stack;
 
-pub use many::{FileImage, ManyImages, Skipped, file_images, losses, many_images};
+pub use many::{FileImage, ManyImages, Skipped, file_images, many_images};
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 pub use one::{DropoutReport, OneError, OneImage, OneReport, one_image, write_image};
 pub use solver::{

@@ -463,7 +463,7 @@ fn what_is_left_out_of_a_text_is_a_note() {
     let found = read(&path, &as_is()).unwrap();
     let Readings::Differential(d) = &found.readings else { panic!("{:?}", found.readings) };
     assert!(d.iter().eq((0..16).map(|row| f64::from(20 - row) + 0.5).collect::<Vec<_>>().iter()));
-    let told = "left out of the text: 1 line before the table; columns without numbers: `word`";
+    let told = "left out of the text: 1 line before the table; columns that hold words: `word`";
     assert_eq!(found.notes, [told]);
 }
 

@@ -35,7 +35,8 @@ pub(super) struct Found {
 /// A line and its number.
 type Line<'t> = (usize, &'t str);
 
-/// The table in these lines; `None` if there is none, or none for sure.
+/// The table in these lines; `None` if no table is found, or if it is not certain that the lines are one
+/// table.
 pub(super) fn find(
     path: &Path,
     lines: &[Line<'_>],
@@ -104,7 +105,7 @@ pub(super) fn find(
         skipped.push("the units below its heading".to_owned());
     }
     if !words.is_empty() {
-        skipped.push(format!("columns without numbers: {}", words.join(", ")));
+        skipped.push(format!("columns that hold words: {}", words.join(", ")));
     }
     if after.len() + ends > 0 {
         skipped.push(format!("{} after it", count_of(after.len() + ends, "line")));
@@ -238,7 +239,7 @@ mod tests {
         );
         let (found, skipped) = columns(&text);
         assert_eq!(found, [expected("Samples", k), expected("Power (W)", y)]);
-        let told = "3 lines before the table; columns without numbers: `Date`, `Time`";
+        let told = "3 lines before the table; columns that hold words: `Date`, `Time`";
         assert!(skipped.ends_with(told), "{skipped}");
         // A serial monitor.
         let (found, _) = columns(&rows(|k| format!("14:02:0{k}.000 -> {}", y(k))));
@@ -250,7 +251,7 @@ mod tests {
         );
         let (found, skipped) = columns(&text);
         assert_eq!(found, [expected("d, V", y)]);
-        assert!(skipped.ends_with("columns without numbers: `comment`; 1 line after it"));
+        assert!(skipped.ends_with("columns that hold words: `comment`; 1 line after it"));
         // Units in brackets, infinity for overload, decimal commas.
         let text = format!(
             "Time;Channel A\n(ms);(V)\n0;∞\n{}",

@@ -61,7 +61,7 @@ impl HeldBack {
         })
     }
 
-    /// The mean of several judgements; `None` if there is none.
+    /// The mean of several judgements; `None` for an empty list.
     pub(super) fn mean(all: &[Self]) -> Option<Self> {
         let of = |part: fn(&Self) -> f64| all.iter().map(part).sum::<f64>() / all.len() as f64;
         let mean = || Self {

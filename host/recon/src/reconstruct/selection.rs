@@ -188,7 +188,7 @@ pub(super) fn choose_together(
     Ok(Some(Together { at, trust, held_back: held_back.collect() }))
 }
 
-/// The numbers of atoms to try for so many measurements.
+/// The numbers of atoms to try for this number of measurements.
 pub(super) fn sparsities(measurements: usize, most: usize) -> Vec<usize> {
     geometric(most.min(measurements / 4).max(1))
 }

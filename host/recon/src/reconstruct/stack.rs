@@ -247,6 +247,19 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_noise_that_is_asked_for_is_the_noise_of_each() {
+        let scene = scene(side(16), 1);
+        let frames: Vec<_> = (0..10).map(|k| noisy(&rows(0.5), &scene, 0.5, k)).collect();
+        let sparsity = crate::reconstruct::Sparsity::Fixed(5);
+        let printed = MethodSettings { sparsity, as_printed: true, ..MethodSettings::default() };
+        let method = Method::OMP.prepare(&printed).unwrap();
+        for (made, frame) in stack(&*method, &frames).unwrap().iter().zip(&frames) {
+            assert_eq!(made.report.noise, Some(0.0));
+            assert_eq!(made.report.sparsity, method.reconstruct(frame).unwrap().report.sparsity);
+        }
+    }
+
     /// Root of the mean squared error of the images.
     fn error(made: &[Reconstruction], truth: &[f64]) -> f64 {
         let of = |image: &crate::Image| {

@@ -56,7 +56,7 @@ pub(in super::super) fn omp_kind(
         let images = together.par_iter().zip(solutions).map_init(
             || first.clone(),
             |problem, (measured, solution)| {
-                problem.read(measured);
+                problem.read(measured, settings.noise);
                 let predicted =
                     dictionary.dictionary().predict(&solution.support, &solution.coefficients);
                 let found = match settings.exactly_sparse {
