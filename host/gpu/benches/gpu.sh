@@ -7,8 +7,9 @@
 # Parts, each of which ends within seven minutes, with what it has not reached by then skipped:
 #
 #   correctness    tests of every kernel, GPU against processor on whole images, compute-sanitizer
-#   speed          OMP, networks and pipeline; the same in PyTorch, and batched-omp
-#   profile        time of each kernel of the networks (ncu), PyTorch with torch.compile
+#   speed          OMP, networks and pipeline
+#   peers          the same networks in PyTorch, and batched-omp, with ours beside them
+#   profile        time of each kernel of the networks (ncu)
 #
 # OUT/ has a file for each step. A step that fails or is missing says so, and the next one goes on; the last lines, in
 # OUT/summary.txt too, have each step and its result. `run` ends with 1 if a step of `correctness` failed.
@@ -171,16 +172,6 @@ speed() {
     done
     bench pipeline pipeline --backend cuda --frames 1
 
-    if needs python3 peer; then
-        echo "== the same networks in PyTorch on the same card"
-        for frames in 1 4096; do
-            lines=40 step "peer-$frames" 60 python3 host/nets/scripts/peer.py --device cuda --frames $frames || true
-        done
-        lines=40 step peer-graph 60 python3 host/nets/scripts/peer.py --device cuda --frames 4096 --compile graph || true
-        lines=40 step peer-graph-1024 60 \
-            python3 host/nets/scripts/peer.py --device cuda --frames 4096 --batch 1024 --compile graph || true
-    fi
-
     echo "== OMP, with the transfer of measurements, solutions and images"
     for precision in f32 auto; do
         for frames in 1 64 256 1024 4096 16384; do
@@ -194,6 +185,27 @@ speed() {
     done
     # The processor beside, for the number of frames from which `auto` takes a GPU.
     for frames in 1 64 4096; do bench omp omp --backend cpu --precision f32 --frames $frames; done
+}
+
+peers() {
+    local precision frames
+    echo "== our networks, on the same card"
+    for precision in f32 f16; do
+        for frames in 1 4096; do
+            bench enhance enhance --backend cuda --precision $precision --no-consistency --frames $frames
+        done
+    done
+    if needs python3 peer; then
+        echo "== the same networks in PyTorch on the same card"
+        for frames in 1 4096; do
+            lines=40 step "peer-$frames" 60 python3 host/nets/scripts/peer.py --device cuda --frames $frames || true
+        done
+        lines=40 step peer-graph 60 python3 host/nets/scripts/peer.py --device cuda --frames 4096 --compile graph || true
+        lines=40 step peer-graph-1024 60 \
+            python3 host/nets/scripts/peer.py --device cuda --frames 4096 --batch 1024 --compile graph || true
+        lines=40 step peer-max-autotune 150 \
+            python3 host/nets/scripts/peer.py --device cuda --frames 4096 --compile max-autotune || true
+    fi
 
     if needs python3 batched-omp && tar -xzf .gpu/orthogonal_matching_pursuit_gpu-*.tar.gz -C "$work"; then
         echo "== batched-omp on the same card"
@@ -214,10 +226,6 @@ profile() {
             lines=60 step "kernels-$precision" 10 python3 host/gpu/benches/kernels.py "$out/ncu-$precision.csv" || true
         fi
     done
-    if needs python3 peer; then
-        lines=40 step peer-max-autotune 150 \
-            python3 host/nets/scripts/peer.py --device cuda --frames 4096 --compile max-autotune || true
-    fi
 }
 
 # Time, share of the time in which the f32 units work, warps, registers: names that ncu 2025.3 knows for an H100.
@@ -248,7 +256,7 @@ run() {
     # Kernels are compiled once for all steps.
     export NIRSPI_KERNEL_CACHE=$work/kernels
     nvidia-smi 2>&1 | tee "$out/nvidia-smi.txt" || true
-    if [ $# = 0 ]; then set -- correctness speed profile; fi
+    if [ $# = 0 ]; then set -- correctness speed peers profile; fi
     for part; do
         echo "== $part ($(date -u +%H:%M:%S))"
         ends=$((SECONDS + part_s))
@@ -260,7 +268,7 @@ run() {
 }
 
 usage() {
-    sed -n '3,14s/^# *//p' "$0"
+    sed -n '3,15s/^# *//p' "$0"
     exit 2
 }
 
@@ -269,7 +277,7 @@ pack) pack ;;
 run)
     [ -n "${2-}" ] || usage
     for part in "${@:3}"; do
-        case $part in correctness | speed | profile) ;; *) usage ;; esac
+        case $part in correctness | speed | peers | profile) ;; *) usage ;; esac
     done
     run "${@:2}"
     ;;

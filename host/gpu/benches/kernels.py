@@ -19,7 +19,7 @@ def main():
     units, rows = rows[0], rows[1:]
     time = "gpu__time_duration.sum"
     to_ms = {"ns": 1e-6, "us": 1e-3, "usecond": 1e-3, "nsecond": 1e-6, "ms": 1.0, "msecond": 1.0}[units[time]]
-    shares = [name for name in rows[0] if name.endswith(("_active", "_elapsed"))]
+    shares = [name for name in rows[0] if ".avg." in name and name.endswith("_active")]
     kinds = collections.defaultdict(list)
     for row in rows:
         kinds[row["Kernel Name"], row["Grid Size"], row["Block Size"]].append(row)

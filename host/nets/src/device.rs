@@ -182,15 +182,6 @@ impl Device {
         }
     }
 
-    /// The same device, for images that come from OMP or from the host; `None` for the processor.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn uploads(&self) -> Option<nirspi_recon::omp::gpu::Device> {
-        match &self.kind {
-            Kind::Cpu => None,
-            Kind::Gpu(gpu) => Some(nirspi_recon::omp::gpu::Device::of(gpu)),
-        }
-    }
-
     /// Number of images that keep the device busy.
     pub(crate) fn batch(&self) -> usize {
         match self.kind {

@@ -7,28 +7,25 @@
 
 mod chain;
 
-use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nirspi_gpu::GpuError;
 use nirspi_gpu::agreement::BROKEN;
-use nirspi_recon::omp::OmpError;
-use nirspi_recon::omp::gpu::{self, DeviceImages};
-use rayon::prelude::*;
+use nirspi_recon::omp::gpu::DeviceImages;
 use thiserror::Error;
 
-use super::{Enhanced, Options, constraint_on};
+use super::{AREA, Enhanced, Options, constraint_on};
 use crate::consistency::MeasuredRowsError;
 use crate::device::{Backend, Device};
+use crate::estimate::Estimate;
 use crate::fusion::{self, DepthMaps, push_planes};
 use crate::weights::{Weights, WeightsError};
-use chain::{Chain, Guess};
+use chain::{Chain, Room, Source};
 
 /// Number of batches that are under way at a time, each on a thread and a stream of its own: while
 /// the results of one are copied, another one is computed.
 const AT_A_TIME: usize = 2;
-
-/// Number of images that are uploaded at a time, 32 MB: less than the largest buffer of every device.
-const UPLOADED: usize = 8192;
 
 /// Why images on a device cannot be enhanced there.
 #[derive(Debug, Error)]
@@ -63,9 +60,6 @@ pub enum DeviceEnhancerError {
     /// The measured rows do not belong to these readings.
     #[error(transparent)]
     Rows(#[from] MeasuredRowsError),
-    /// The images could not be uploaded.
-    #[error(transparent)]
-    Upload(#[from] OmpError),
     /// A network gave NaN.
     #[error("the networks gave NaN for image {image}")]
     NotANumber {
@@ -88,8 +82,6 @@ pub enum DeviceEnhancerError {
 pub struct DeviceEnhancer {
     chain: Chain,
     backend: Backend,
-    /// The same device, for uploads.
-    uploads: gpu::Device,
     batch: usize,
 }
 
@@ -107,13 +99,11 @@ impl DeviceEnhancer {
     ) -> Result<Self, DeviceEnhancerError> {
         let engine = device.engine().ok_or(DeviceEnhancerError::NoGpu)?;
         let chain = Chain::new(device, &engine, [fsrcnn, estimator, bridge])?;
-        let backend = device.backend();
-        let uploads = device.uploads().ok_or(DeviceEnhancerError::NoGpu)?;
-        Ok(Self { chain, backend, uploads, batch: device.batch() })
+        Ok(Self { chain, backend: device.backend(), batch: device.batch() })
     }
 
-    /// Uploads images of 32 x 32, values in [0, 1], and enhances them; otherwise as
-    /// [`enhance`](Self::enhance). Images beyond the device's largest buffer are uploaded in parts.
+    /// Enhances images of 32 x 32 that are in the host's memory, values in [0, 1]; otherwise as
+    /// [`enhance`](Self::enhance).
     pub(super) fn enhance_values(
         &self,
         values: &[f32],
@@ -121,16 +111,7 @@ impl DeviceEnhancer {
         options: &Options,
         progress: &mut dyn FnMut(usize),
     ) -> Result<Enhanced, DeviceEnhancerError> {
-        const AREA: usize = fusion::SIDE * fusion::SIDE;
-        let mut all = Enhanced::default();
-        for (index, part) in values.chunks(UPLOADED * AREA).enumerate() {
-            let images = DeviceImages::upload(&self.uploads, part, AREA)?;
-            let (first, count) = (index * UPLOADED, part.len() / AREA);
-            let depth = depth.map(|depth| depth.of(first, count));
-            let mut told = |done| progress(first + done);
-            all.append(self.enhance(&images, 1.0, depth.as_ref(), options, &mut told)?);
-        }
-        Ok(all)
+        self.enhance_all(Source::Here(values), 1.0, depth, options, progress)
     }
 
     /// Enhances images on the networks' device, with their depth maps. Values are divided by
@@ -161,56 +142,116 @@ impl DeviceEnhancer {
         if options.copies > 0 {
             return Err(DeviceEnhancerError::Copies);
         }
-        let batches: Vec<_> = (0..images.frames())
-            .step_by(self.batch)
-            .map(|first| first..images.frames().min(first + self.batch))
-            .collect();
-        let run = |part: &Range<usize>| {
-            let mut planes = Vec::new();
-            if depth.is_some() {
-                planes.reserve(2 * part.len() * images.pixels());
-                part.clone().for_each(|image| push_planes(depth, image, &mut planes));
-            }
-            let guess = self.chain.run(images, part.clone(), white, &planes, options)?;
-            finished(guess, part.start, options)
+        self.enhance_all(Source::There(images), white, depth, options, progress)
+    }
+
+    /// Enhances all images, [`AT_A_TIME`] batches at a time.
+    ///
+    /// Each result is copied once, from the driver's memory to its place among all results, by the
+    /// thread of its batch: memory that was never written takes longer than the networks.
+    fn enhance_all(
+        &self,
+        images: Source<'_>,
+        white: f32,
+        depth: Option<&DepthMaps>,
+        options: &Options,
+        progress: &mut dyn FnMut(usize),
+    ) -> Result<Enhanced, DeviceEnhancerError> {
+        let frames = images.frames();
+        let unknown = Estimate { sigma_px: f32::NAN, noise: f32::NAN };
+        let mut estimated = vec![unknown; frames];
+        let [mut start, mut sharp] = [(); 2].map(|()| vec![0.0; frames * AREA]);
+        let mut inconsistency = vec![0.0; frames];
+        let room = Room {
+            estimated: &mut estimated,
+            start: &mut start,
+            images: &mut sharp,
+            inconsistency: &mut inconsistency,
         };
-        let mut all = Enhanced::default();
-        for together in batches.chunks(AT_A_TIME) {
-            let done: Vec<_> = together.par_iter().map(run).collect();
-            for enhanced in done {
-                all.append(enhanced?);
-                progress(all.estimates.len());
+        let queue = Mutex::new(Queue { first: 0, room });
+        let done = AtomicUsize::new(0);
+        let work = |progress: &mut dyn FnMut(usize)| -> Result<(), DeviceEnhancerError> {
+            loop {
+                let next = lock(&queue).next(self.batch);
+                let Some((first, room)) = next else { return Ok(()) };
+                let frames = room.frames();
+                self.batch(images, (first, white), depth, options, room)
+                    .inspect_err(|_| lock(&queue).room = Room::default())?;
+                progress(done.fetch_add(frames, Ordering::Relaxed) + frames);
             }
+        };
+        let mut others = [const { Ok(()) }; AT_A_TIME - 1];
+        let mut mine = Ok(());
+        // The caller's thread takes batches too, so that no pool is too small.
+        rayon::in_place_scope(|scope| {
+            for other in &mut others {
+                scope.spawn(|_| *other = work(&mut |_| {}));
+            }
+            mine = work(progress);
+        });
+        mine?;
+        others.into_iter().collect::<Result<(), _>>()?;
+        progress(frames);
+        Ok(Enhanced {
+            images: sharp,
+            upscaled: Some(start),
+            estimates: super::known(options, &estimated),
+            estimated: Some(estimated),
+            inconsistency,
+            spread: None,
+        })
+    }
+
+    /// Computes the results for the images from number `first` on into `room`.
+    fn batch(
+        &self,
+        images: Source<'_>,
+        (first, white): (usize, f32),
+        depth: Option<&DepthMaps>,
+        options: &Options,
+        mut room: Room<'_>,
+    ) -> Result<(), DeviceEnhancerError> {
+        let frames = room.frames();
+        let mut planes = Vec::new();
+        if depth.is_some() {
+            planes.reserve(frames * 2 * fusion::SIDE * fusion::SIDE);
+            (first..first + frames).for_each(|image| push_planes(depth, image, &mut planes));
         }
-        Ok(all)
+        let readings = self.chain.run(images, (first, white), &planes, options, room.reborrow())?;
+        if !readings.is_empty() {
+            // The agreement that a device without memory for its kernel leaves to the host.
+            let estimates = super::known(options, room.estimated);
+            let constraint = constraint_on(&readings, &estimates, options)?;
+            constraint.correct(room.images);
+            room.inconsistency.copy_from_slice(&constraint.residual_ratios(room.images));
+        }
+        let broken = |&ratio: &f32| ratio.is_nan() || ratio == BROKEN;
+        match room.inconsistency.iter().position(broken) {
+            Some(at) => Err(DeviceEnhancerError::NotANumber { image: first + at }),
+            None => Ok(()),
+        }
     }
 }
 
-/// The results, with the agreement that a device without room for its kernel leaves to the host.
-/// `first` is the index of the first image.
-fn finished(
-    guess: Guess,
+fn lock<'a, 'b>(queue: &'a Mutex<Queue<'b>>) -> MutexGuard<'a, Queue<'b>> {
+    queue.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The images that no thread has taken yet.
+struct Queue<'a> {
+    /// Number of the first of them.
     first: usize,
-    options: &Options,
-) -> Result<Enhanced, DeviceEnhancerError> {
-    let Guess { estimated, start, mut images, mut inconsistency, readings } = guess;
-    let estimates = super::known(options, &estimated);
-    if !readings.is_empty() {
-        let constraint = constraint_on(&readings, &estimates, options)?;
-        constraint.correct(&mut images);
-        inconsistency = constraint.residual_ratios(&images);
+    room: Room<'a>,
+}
+
+impl<'a> Queue<'a> {
+    /// Takes the next batch: the number of its first image, and where its results go.
+    fn next(&mut self, batch: usize) -> Option<(usize, Room<'a>)> {
+        let room = self.room.take(batch.min(self.room.frames()));
+        let first = self.first;
+        self.first += room.frames();
+        (room.frames() > 0).then_some((first, room))
     }
-    if let Some(at) = inconsistency.iter().position(|&ratio| ratio.is_nan() || ratio == BROKEN) {
-        return Err(DeviceEnhancerError::NotANumber { image: first + at });
-    }
-    Ok(Enhanced {
-        images,
-        upscaled: Some(start),
-        estimates,
-        estimated: Some(estimated),
-        inconsistency,
-        spread: None,
-    })
 }
 
 #[cfg(test)]

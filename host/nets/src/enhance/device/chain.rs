@@ -18,32 +18,79 @@ use nirspi_gpu::agreement::Agreement;
 use nirspi_gpu::limits::DeviceLimits;
 use nirspi_gpu::network::Degraded;
 use nirspi_gpu::network::plan::frames_at_once;
-use nirspi_gpu::{Buffer, GpuError, Kernels};
+use nirspi_gpu::{Buffer, GpuError, Kernels, Numbers};
 use nirspi_recon::omp::gpu::DeviceImages;
-use std::ops::Range;
 use std::sync::Arc;
 
-/// The results for some images, on the host.
-#[derive(Default)]
-pub(super) struct Guess {
-    /// As the estimator found them.
-    pub(super) estimated: Vec<Estimate>,
-    /// (N, 64, 64) in [0, 1]: FSRCNN's output.
-    pub(super) start: Vec<f32>,
-    /// (N, 64, 64): the bridge's output after one step from `start`; not clamped if there are
-    /// `readings`, else in agreement with them.
-    pub(super) images: Vec<f32>,
-    /// The inconsistency of each image; none if there are `readings`.
-    pub(super) inconsistency: Vec<f32>,
-    /// (N, 32, 32) in [0, 1], if the device could not compute the agreement with them.
-    pub(super) readings: Vec<f32>,
+/// Images to enhance.
+#[derive(Clone, Copy)]
+pub(super) enum Source<'a> {
+    /// On the device, as OMP left them.
+    There(&'a DeviceImages),
+    /// In the host's memory, (N, 32, 32) in [0, 1].
+    Here(&'a [f32]),
 }
 
-impl Guess {
-    /// No results yet, and room for images with this number of pixels in all.
-    fn with_capacity(pixels: usize) -> Self {
-        let [start, images] = [(); 2].map(|()| Vec::with_capacity(pixels));
-        Self { start, images, ..Self::default() }
+impl Source<'_> {
+    /// Number of images.
+    pub(super) fn frames(&self) -> usize {
+        match self {
+            Self::There(images) => images.frames(),
+            Self::Here(values) => values.len() / (fusion::SIDE * fusion::SIDE),
+        }
+    }
+
+    /// The images from number `first` on, divided by `white` and clamped to [0, 1].
+    fn readings(&self, on: &dyn Kernels, (first, frames): (usize, usize), white: f32) -> Buffer {
+        let area = fusion::SIDE * fusion::SIDE;
+        let (first, count) = (first * area, frames * area);
+        match self {
+            Self::There(images) => on.readings(images.buffer(), first, white, count),
+            Self::Here(values) => {
+                on.readings(&on.upload(&values[first..][..count]), 0, white, count)
+            }
+        }
+    }
+}
+
+/// Where the results for some images go: a slice of the results for all of them.
+#[derive(Default)]
+pub(super) struct Room<'a> {
+    /// As the estimator found them.
+    pub(super) estimated: &'a mut [Estimate],
+    /// (N, 64, 64) in [0, 1]: FSRCNN's output.
+    pub(super) start: &'a mut [f32],
+    /// (N, 64, 64): the bridge's output after one step from `start`; not clamped if the device
+    /// could not compute the agreement with the readings, else in agreement with them.
+    pub(super) images: &'a mut [f32],
+    /// The inconsistency of each image, if the device computed the agreement.
+    pub(super) inconsistency: &'a mut [f32],
+}
+
+impl<'a> Room<'a> {
+    /// Number of images.
+    pub(super) fn frames(&self) -> usize {
+        self.estimated.len()
+    }
+
+    /// The same room, lent.
+    pub(super) fn reborrow(&mut self) -> Room<'_> {
+        let Self { estimated, start, images, inconsistency } = self;
+        Room { estimated, start, images, inconsistency }
+    }
+
+    /// Takes the room of the first `frames` images.
+    pub(super) fn take(&mut self, frames: usize) -> Room<'a> {
+        fn first<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+            rest.split_off_mut(..count).unwrap_or_default()
+        }
+        let pixels = frames * SIDE * SIDE;
+        Room {
+            estimated: first(&mut self.estimated, frames),
+            start: first(&mut self.start, pixels),
+            images: first(&mut self.images, pixels),
+            inconsistency: first(&mut self.inconsistency, frames),
+        }
     }
 }
 
@@ -79,19 +126,20 @@ impl Chain {
         })
     }
 
-    /// Appends the results for `frames` images, beginning with number `first`.
+    /// Computes `part`, whose first image has the number `first`. What is returned are the readings,
+    /// (N, 32, 32) in [0, 1], if the device did not compute the agreement with them.
     fn part(
         &self,
-        images: &Buffer,
-        (first, frames): (usize, usize),
-        white: f32,
+        images: Source<'_>,
+        (first, white): (usize, f32),
         depth: &[f32],
         (known, agreement): (KnownEstimate, Option<&Agreement>),
-        all: &mut Guess,
-    ) -> Result<(), GpuError> {
+        part: Room<'_>,
+    ) -> Result<Option<Numbers>, GpuError> {
         let on = self.engine.as_ref();
-        let (coarse, area) = ((frames, fusion::SIDE), fusion::SIDE * fusion::SIDE);
-        let readings = on.readings(images, first * area, white, frames * area);
+        let frames = part.frames();
+        let coarse = (frames, fusion::SIDE);
+        let readings = images.readings(on, (first, frames), white);
         let outputs = self.estimator.forward(coarse, &readings);
         let depth = (!depth.is_empty()).then(|| on.upload(depth));
         let start = self.fsrcnn.forward(coarse, &readings, depth.as_ref(), true);
@@ -113,28 +161,33 @@ impl Chain {
         };
         let [outputs, start, images, last] = read?;
         let each = outputs.floats().as_chunks().0.iter();
-        all.estimated.extend(each.map(|&two| Estimate::of_outputs(two, fusion::SIDE)));
-        all.start.extend_from_slice(start.floats());
-        all.images.extend_from_slice(images.floats());
-        let rest = if agreement.is_some() { &mut all.inconsistency } else { &mut all.readings };
-        rest.extend_from_slice(last.floats());
-        Ok(())
+        for (to, &two) in part.estimated.iter_mut().zip(each) {
+            *to = Estimate::of_outputs(two, fusion::SIDE);
+        }
+        part.start.copy_from_slice(start.floats());
+        part.images.copy_from_slice(images.floats());
+        if agreement.is_none() {
+            return Ok(Some(last));
+        }
+        part.inconsistency.copy_from_slice(last.floats());
+        Ok(None)
     }
 
-    /// The results for some of the images, with `white` scaled to 1. `depth` is (N, 2, 32, 32), see
-    /// [`push_planes`](crate::fusion::push_planes); empty without depth.
+    /// Computes the results for the images from number `first` on, with `white` scaled to 1, into
+    /// `room`. `depth` is (N, 2, 32, 32), see [`push_planes`](crate::fusion::push_planes); empty
+    /// without depth. What is returned are the readings, (N, 32, 32) in [0, 1], if the device could
+    /// not compute the agreement with them, else nothing.
     ///
     /// # Errors
     /// [`GpuError`] if the GPU or its driver fails.
     pub(super) fn run(
         &self,
-        images: &DeviceImages,
-        part: Range<usize>,
-        white: f32,
+        images: Source<'_>,
+        (first, white): (usize, f32),
         depth: &[f32],
         options: &Options,
-    ) -> Result<Guess, GpuError> {
-        let images = images.buffer();
+        mut room: Room<'_>,
+    ) -> Result<Vec<f32>, GpuError> {
         let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
         let at_once = self.unet.at_once(SIDE).min(coarse);
         let on = self.engine.as_ref();
@@ -146,17 +199,17 @@ impl Chain {
         let scratch = agreement.as_ref().map_or(0, Agreement::scratch);
         let at_once = frames_at_once(scratch, on.limits().buffer_bytes, at_once);
         let planes = 2 * fusion::SIDE * fusion::SIDE;
-        let area = SIDE * SIDE;
-        let mut all = Guess::with_capacity(part.len() * area);
-        for first in part.clone().step_by(at_once) {
-            let frames = at_once.min(part.end - first);
+        let mut readings = Vec::new();
+        for done in (0..room.frames()).step_by(at_once) {
+            let part = room.take(at_once.min(room.frames()));
             let depth = match depth {
                 [] => &[],
-                _ => &depth[(first - part.start) * planes..][..frames * planes],
+                _ => &depth[done * planes..][..part.frames() * planes],
             };
-            let known = (options.estimate, agreement.as_ref());
-            self.part(images, (first, frames), white, depth, known, &mut all)?;
+            let known = (*estimate, agreement.as_ref());
+            let left = self.part(images, (first + done, white), depth, known, part)?;
+            readings.extend(left.iter().flat_map(Numbers::floats));
         }
-        Ok(all)
+        Ok(readings)
     }
 }
