@@ -3,7 +3,7 @@
     python host/scripts/small_files.py
 
 Writes host/files/src/small/: n = 2, h_row = 0, 3, 1 and y = 5, 1, 2, 3, 4, 4.5, a complex array z of 2 x 3, and a text. Needs numpy,
-scipy and h5py. claims.h5 claims an array that takes more memory than a reader
+scipy and h5py. nested.mat and nested.h5 have n and h_row in a structure or group `run`, y in `run.adc`. claims.h5 claims an array that takes more memory than a reader
 allows.
 """
 
@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import scipy.io
 
-OUT = Path(__file__).parent.parent / "src" / "files" / "small"
+OUT = Path(__file__).parent.parent / "files" / "src" / "small"
 REAL = {"n": 2, "h_row": np.array([0, 3, 1]), "y": np.array([5, 1, 2, 3, 4, 4.5])}
 COMPLEX = np.array([[1 + 10j, 2 + 20j, 3 + 30j], [4 + 40j, 5 + 50j, 6 + 60j]])
 
@@ -36,6 +36,13 @@ OUT.mkdir(exist_ok=True)
 for name, compressed in (("level5.mat", False), ("level5_compressed.mat", True)):
     variables = REAL | {"z": COMPLEX, "text": "some words"}
     scipy.io.savemat(OUT / name, variables, do_compression=compressed, oned_as="column")
+scipy.io.savemat(OUT / "level4.mat", REAL | {"z": COMPLEX}, format="4", oned_as="column")
+NESTED = {"n": REAL["n"], "adc": {"text": "some words", "y": REAL["y"]}, "h_row": REAL["h_row"]}
+scipy.io.savemat(OUT / "nested.mat", {"run": NESTED}, do_compression=True, oned_as="column")
+with h5py.File(OUT / "nested.h5", "w") as file:
+    file["run/n"], file["run/h_row"], file["run/adc/y"] = REAL["n"], REAL["h_row"], REAL["y"]
+    # A group that holds itself.
+    file["run/adc/again"] = file["run"]
 matlab73(OUT / "level73.mat")
 with h5py.File(OUT / "h5py.h5", "w") as file:
     for name, array in REAL.items():

@@ -26,7 +26,8 @@ pub struct SourceArgs {
     /// Side of the image in pixels, for a file that does not say its side and holds part of a sweep
     #[arg(long, value_name = "N")]
     pub side: Option<u64>,
-    /// The field of the file that holds the readings [default: y if the file has it, else d]
+    /// The field of the file that holds the readings, or the two fields of patterns and complements, with a comma between
+    /// [default: y if the file has it, else d]
     #[arg(long, value_name = "NAME")]
     pub field: Option<String>,
     /// How readings belong to patterns [default: pairs; differences in the field d]

@@ -10,8 +10,9 @@ use super::field::{EXPECTED, Field};
 #[cfg(feature = "hdf5")]
 use super::hdf5::Hdf5;
 use super::mat::Mat;
+use super::mat4::Mat4;
 use super::npy;
-use super::plain::{kind_by_start, open_file};
+use super::plain::{is_mat_4, kind_by_start, open_file};
 use super::stored::Stored;
 use super::text;
 use std::io::Read;
@@ -31,6 +32,8 @@ pub(super) struct Fields {
     path: PathBuf,
     names: Vec<String>,
     format: Format,
+    /// Fields that were made of those of the file, and stand for fields of their names.
+    made: Vec<(String, Field)>,
     /// What a text has beside its table and is left out, in one line.
     skipped: Option<String>,
 }
@@ -38,6 +41,7 @@ pub(super) struct Fields {
 enum Format {
     Npz(Archive),
     Mat(Mat),
+    Mat4(Mat4),
     #[cfg(feature = "hdf5")]
     Hdf5(Hdf5),
     /// Columns of a text with a heading.
@@ -66,6 +70,9 @@ impl Fields {
         } else if Mat::is_start(&start) {
             let mat = Mat::open(path, whole(path, length, "a MATLAB file")?)?;
             (mat.names(), Format::Mat(mat))
+        } else if is_mat_4(&start) {
+            let mat = Mat4::open(path, whole(path, length, "a MATLAB file")?)?;
+            (mat.names(), Format::Mat4(mat))
         } else if text::is_start(&start) {
             let text = text::read(path, decimal_comma)?;
             skipped = text.skipped;
@@ -82,7 +89,7 @@ impl Fields {
         if decimal_comma && !matches!(format, Format::Columns(_) | Format::Unnamed(_)) {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
-        Ok(Self { path: path.to_owned(), names, format, skipped })
+        Ok(Self { path: path.to_owned(), names, format, made: Vec::new(), skipped })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -109,6 +116,12 @@ impl Fields {
         matches!(self.format, Format::Columns(_))
     }
 
+    /// Puts a field that was made of others in the place of the field of this name.
+    pub(super) fn set(&mut self, name: &str, field: Field) {
+        self.made.retain(|(made, _)| made != name);
+        self.made.push((name.to_owned(), field));
+    }
+
     pub(super) fn holds(&self, field: &str) -> bool {
         self.names.iter().any(|name| name == field)
     }
@@ -120,9 +133,12 @@ impl Fields {
         accept: impl Fn(&[u64]) -> Result<(), String>,
     ) -> Result<Field, FileError> {
         let at = self.names.iter().position(|name| name == field);
+        let made = self.made.iter().find(|(name, _)| name == field).map(|(_, made)| made.clone());
         let loaded = match &mut self.format {
+            _ if made.is_some() => made,
             Format::Npz(archive) => return archive.field(field, accept),
             Format::Mat(mat) => return mat.read(field, accept),
+            Format::Mat4(mat) => return mat.read(field, accept),
             #[cfg(feature = "hdf5")]
             Format::Hdf5(file) => return file.read(field, accept),
             Format::Columns(fields) => at.and_then(|at| fields.get(at)).cloned(),
@@ -149,7 +165,9 @@ impl Fields {
         accept: impl Fn(&[u64]) -> Result<(), String>,
     ) -> Result<(Vec<u64>, Option<Field>), FileError> {
         let (shape, numbers) = match &mut self.format {
-            Format::Npz(archive) => (archive.shape(field, accept)?, None),
+            Format::Npz(archive) if !self.made.iter().any(|(name, _)| name == field) => {
+                (archive.shape(field, accept)?, None)
+            }
             _ => {
                 let numbers = self.read(field, accept)?;
                 (numbers.shape.clone(), Some(numbers))
@@ -161,7 +179,9 @@ impl Fields {
     /// A field whose real numbers lie in the file as they are; `None` for any other field.
     pub(super) fn stored(&mut self, field: &str) -> Result<Option<Stored>, FileError> {
         match &mut self.format {
-            Format::Npz(archive) => archive.stored(field),
+            Format::Npz(archive) if !self.made.iter().any(|(name, _)| name == field) => {
+                archive.stored(field)
+            }
             _ => Ok(None),
         }
     }

@@ -14,6 +14,10 @@ use std::path::{Path, PathBuf};
 const EXPECTED: &str = "an HDF5 file";
 /// The largest field read into memory.
 const MAX_FIELD_BYTES: usize = 256 << 20;
+/// The most groups around an array that has a name.
+const MAX_DEPTH: usize = 8;
+/// The number of names from which on no further group is opened.
+const MAX_NAMES: usize = 1000;
 
 /// An open file.
 pub(super) struct Hdf5 {
@@ -37,10 +41,28 @@ impl Hdf5 {
         Ok(Self { path: path.to_owned(), file, is_matlab })
     }
 
-    /// Names of the arrays that are in no group.
+    /// Names of the arrays, those in groups by their path: `run1/adc/y`, or `meas.y` for a field of
+    /// a structure of MATLAB.
     pub(super) fn names(&self) -> Result<Vec<String>, FileError> {
-        let root = self.file.root_group().and_then(|root| root.member_names());
-        Ok(root.map_err(|error| damaged(&self.path, error.to_string()))?.1)
+        let explain = |error: Error| damaged(&self.path, error.to_string());
+        let between = if self.is_matlab { '.' } else { '/' };
+        // MATLAB keeps parts of cell arrays in a group of its own.
+        let is_hidden = |name: &str| self.is_matlab && name.starts_with('#');
+        let mut names = Vec::new();
+        let mut groups = vec![(String::new(), 0, self.file.root_group().map_err(explain)?)];
+        // A group can hold itself: what is deeper has no name.
+        while let Some((path, depth, group)) = groups.pop() {
+            let (inner, arrays) = group.member_names().map_err(explain)?;
+            names.extend(arrays.into_iter().map(|name| format!("{path}{name}")));
+            for name in inner.into_iter().filter(|name| !is_hidden(name)) {
+                if depth == MAX_DEPTH || names.len() >= MAX_NAMES {
+                    break;
+                }
+                let group = group.group(&name).map_err(explain)?;
+                groups.push((format!("{path}{name}{between}"), depth + 1, group));
+            }
+        }
+        Ok(names)
     }
 
     pub(super) fn read(
@@ -51,7 +73,8 @@ impl Hdf5 {
         let explain = |error: Error| damaged(&self.path, format!("`{field}`: {error}"));
         let refuse =
             |found: String, expected: &str| FileError::field(&self.path, field, found, expected);
-        let data = self.file.dataset(&format!("/{field}")).map_err(explain)?;
+        let path = if self.is_matlab { field.replace('.', "/") } else { field.to_owned() };
+        let data = self.file.dataset(&format!("/{path}")).map_err(explain)?;
         let stored: Vec<u64> = data.shape().to_vec();
         let mut shape = stored.clone();
         if self.is_matlab {

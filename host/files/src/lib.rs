@@ -45,6 +45,8 @@ mod fields;
 mod hdf5;
 #[cfg(not(target_family = "wasm"))]
 mod mat;
+#[cfg(not(target_family = "wasm"))]
+mod mat4;
 mod plain;
 #[cfg(not(target_family = "wasm"))]
 mod stored;

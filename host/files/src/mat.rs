@@ -3,6 +3,8 @@
 //!
 //! Format: MathWorks, *MAT-File Format*, R2023a, "Level 5 MAT-Files".
 //!
+//! A field of a structure has the name `structure.field`.
+//!
 //! Every claim of a header is checked before it is used, and memory grows with the bytes that
 //! arrived. A compressed variable is decompressed only when its field is read, and only up to a
 //! limit.
@@ -11,6 +13,7 @@ use super::FileError;
 use super::array::{MAX_AXES, has_shape, within_memory};
 use super::field::Field;
 use flate2::bufread::ZlibDecoder;
+use std::borrow::Cow;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +29,10 @@ const HEAD_BYTES: u64 = 4096;
 const INT8: u32 = 1;
 const UINT32: u32 = 6;
 const INT32: u32 = 5;
+/// The most structures around an array that has a name.
+const MAX_DEPTH: usize = 8;
+/// The class of structures.
+const STRUCTURE: u32 = 2;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 
@@ -42,10 +49,18 @@ pub(super) struct Mat {
 
 struct Variable {
     name: String,
+    /// The paths of the fields of a structure that are none themselves.
+    fields: Vec<String>,
     /// Start of the matrix's content, compressed or not.
     start: usize,
     end: usize,
     is_compressed: bool,
+}
+
+/// Why the content of a variable is not there.
+enum Unpacked {
+    Larger,
+    Damaged(String),
 }
 
 /// An element: its type and its data.
@@ -89,12 +104,19 @@ impl Mat {
                 MATRIX => Some(content[..content.len().min(HEAD_BYTES as usize)].to_vec()),
                 _ => None,
             };
-            let name = head.and_then(|head| {
+            let named = head.and_then(|head| {
                 let inside = if is_compressed { head.get(8..)? } else { &head[..] };
-                Some(mat.head(inside)?.name)
+                let head = mat.head(inside)?;
+                Some((head.name, head.class == STRUCTURE))
             });
-            if let Some(name) = name {
-                mat.variables.push(Variable { name, start: data, end, is_compressed });
+            if let Some((name, is_structure)) = named {
+                let mut variable =
+                    Variable { name, fields: Vec::new(), start: data, end, is_compressed };
+                // Damage is reported when a field of this structure is read.
+                if is_structure && let Ok(matrix) = mat.unpacked(&variable) {
+                    mat.list(&matrix, "", MAX_DEPTH, &mut variable.fields);
+                }
+                mat.variables.push(variable);
             }
             start = end;
         }
@@ -111,7 +133,11 @@ impl Mat {
     }
 
     pub(super) fn names(&self) -> Vec<String> {
-        self.variables.iter().map(|variable| variable.name.clone()).collect()
+        let names = self.variables.iter().flat_map(|Variable { name, fields, .. }| {
+            let inner = fields.iter().map(move |field| format!("{name}.{field}"));
+            std::iter::once(name.clone()).filter(|_| fields.is_empty()).chain(inner)
+        });
+        names.collect()
     }
 
     pub(super) fn read(
@@ -121,33 +147,31 @@ impl Mat {
     ) -> Result<Field, FileError> {
         let refuse =
             |found: String, expected: String| FileError::field(&self.path, field, found, expected);
-        let variable = self.variables.iter().find(|variable| variable.name == field);
+        let mut path = field.split('.');
+        let first = path.next();
+        let variable = self.variables.iter().find(|variable| Some(&variable.name[..]) == first);
         let Some(variable) = variable else {
             return Err(refuse("is not there".to_owned(), "a variable of the file".to_owned()));
         };
-        let content = &self.bytes[variable.start..variable.end];
-        let mut unpacked = Vec::new();
-        let matrix = if variable.is_compressed {
-            ZlibDecoder::new(content)
-                .take(MAX_VARIABLE_BYTES + 1)
-                .read_to_end(&mut unpacked)
-                .map_err(|error| self.damaged(format!("`{field}`: {error}")))?;
-            if unpacked.len() as u64 > MAX_VARIABLE_BYTES {
-                return Err(refuse("is larger".to_owned(), "at most 256 MiB".to_owned()));
-            }
-            let inner = self.element(&unpacked).filter(|inner| inner.kind == MATRIX);
-            inner.ok_or_else(|| self.damaged(format!("`{field}`: no whole matrix")))?.data
-        } else {
-            content
-        };
+        let matrix = self.unpacked(variable).map_err(|error| match error {
+            Unpacked::Larger => refuse("is larger".to_owned(), "at most 256 MiB".to_owned()),
+            Unpacked::Damaged(found) => self.damaged(format!("`{field}`: {found}")),
+        })?;
         let cut = || self.damaged(format!("`{field}`: it ends inside its numbers"));
-        let head = self.head(matrix).ok_or_else(cut)?;
+        let mut head = self.head(&matrix).ok_or_else(cut)?;
+        for name in path {
+            let mut fields = self.structure(&head).into_iter().flatten();
+            let inner = fields.find(|(field, _)| field == name).ok_or_else(|| {
+                refuse("is not there".to_owned(), "a field of the file".to_owned())
+            })?;
+            head = self.head(inner.1).ok_or_else(cut)?;
+        }
         // Classes 6 to 15 are numbers of any type. Cells, structures, objects, text and sparse
         // matrices have other classes.
         if !(6..=15).contains(&head.class) {
             let kind = match head.class {
                 1 => "a cell array",
-                2 => "a structure",
+                STRUCTURE => "a structure",
                 4 => "text",
                 5 => "a sparse matrix",
                 _ => "an object",
@@ -188,6 +212,63 @@ impl Mat {
             name: String::from_utf8_lossy(name.data).into_owned(),
             rest: name.rest,
         })
+    }
+
+    /// The content of a variable's matrix.
+    fn unpacked(&self, variable: &Variable) -> Result<Cow<'_, [u8]>, Unpacked> {
+        let content = &self.bytes[variable.start..variable.end];
+        if !variable.is_compressed {
+            return Ok(Cow::Borrowed(content));
+        }
+        let mut unpacked = Vec::new();
+        ZlibDecoder::new(content)
+            .take(MAX_VARIABLE_BYTES + 1)
+            .read_to_end(&mut unpacked)
+            .map_err(|error| Unpacked::Damaged(error.to_string()))?;
+        if unpacked.len() as u64 > MAX_VARIABLE_BYTES {
+            return Err(Unpacked::Larger);
+        }
+        let inner = self.element(&unpacked).filter(|inner| inner.kind == MATRIX);
+        let inner = inner.ok_or_else(|| Unpacked::Damaged("no whole matrix".to_owned()))?;
+        let start = inner.data.as_ptr() as usize - unpacked.as_ptr() as usize;
+        let end = start + inner.data.len();
+        unpacked.truncate(end);
+        unpacked.drain(..start);
+        Ok(Cow::Owned(unpacked))
+    }
+
+    /// The names of the fields of a single structure, and the content of the matrix of each.
+    fn structure<'b>(&self, head: &Head<'b>) -> Option<Vec<(String, &'b [u8])>> {
+        if head.class != STRUCTURE || head.shape.iter().any(|&axis| axis != 1) {
+            return None;
+        }
+        let length = self.element(head.rest).filter(|e| e.kind == INT32 && e.data.len() == 4)?;
+        let names = self.element(length.rest).filter(|e| e.kind == INT8)?;
+        let name = |bytes: &[u8]| {
+            let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
+            String::from_utf8_lossy(&bytes[..end]).into_owned()
+        };
+        let mut rest = names.rest;
+        let fields = names.data.chunks_exact((self.word(length.data) as usize).max(1));
+        let fields = fields.map(|bytes| {
+            let matrix = self.element(rest).filter(|inner| inner.kind == MATRIX)?;
+            rest = matrix.rest;
+            Some((name(bytes), matrix.data))
+        });
+        fields.collect()
+    }
+
+    /// Appends the paths of the fields of a structure; those of structures in it have this many
+    /// dots at most.
+    fn list(&self, matrix: &[u8], path: &str, depth: usize, paths: &mut Vec<String>) {
+        let Some(head) = self.head(matrix) else { return };
+        let Some(fields) = self.structure(&head) else {
+            paths.extend(path.strip_suffix('.').map(str::to_owned));
+            return;
+        };
+        for (name, inner) in fields.into_iter().filter(|_| depth > 0) {
+            self.list(inner, &format!("{path}{name}."), depth - 1, paths);
+        }
     }
 
     /// The element at the start of `bytes`. A small element has its data in its tag.

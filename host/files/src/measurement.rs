@@ -2,7 +2,7 @@
 //! HDF5, `.csv` or `.txt`.
 //!
 //! # Invariant
-//! A measurement that [`read`] returns is consistent: every row is known, within range and shown
+//! A measurement that [`read`] returns is consistent: every row is known, within range and there
 //! once, and has one finite reading or pair. Later code need not check again. The reader never
 //! guesses: an order, a side or a form of readings that does not fit the numbers is an error
 //! (`tests::each_bad_field_gets_a_line_that_names_it`,
@@ -14,17 +14,22 @@
 //! |---|---|
 //! | `n` | side of the image, a power of two from 2 to 256; or [`Selection::side`], or a full sweep's |
 //! | `h_row` | `(M,)`: row of the natural-order Hadamard matrix of order n^2 that was shown k-th; negative or NaN: not read; or [`Selection::shown`] |
-//! | `y` | `(..., 2 M)` raw readings in time order +, -, +, -; other forms by [`Selection::form`]; NaN: not read |
+//! | `y` | `(..., 2 M)` or `(..., M, 2)` raw readings in time order +, -, +, -; other forms by [`Selection::form`]; NaN: not read |
 //! | `d` | `(..., M)` differential readings; NaN: not read |
+//! | `sign` | optional, as many as readings: 1 for a pattern, -1 or 0 for a complement, of the same row of `h_row` or else of the next one |
 //! | `simulated` | optional: 1 if no real light was measured |
 //! | `noise` | optional, with `d`: standard deviation of the noise of a value of `d`, the same for all |
 //! | `recon` | optional `(n, n)`, or one for each measurement: someone's reconstruction, to compare with |
+//!
+//! A row that was shown several times has the mean of its readings. Rows and readings may both be
+//! `(n, n)`. [`Selection::field`] may name two fields, `positive,negative`.
 //!
 //! `...` are any leading axes; the measurements in the leading axes are numbered in C order. Axes
 //! of length 1 do not count. Readings may be complex, and of any real type, byte order and memory
 //! order. The reader ignores other fields. If a file is one array, with any name or none, the array
 //! holds the readings.
 
+mod axes;
 mod form;
 mod images;
 mod layout;
@@ -33,6 +38,7 @@ mod plain;
 mod readings;
 mod reference;
 mod rows;
+mod sides;
 mod stack;
 mod write;
 
@@ -55,7 +61,8 @@ pub struct Selection {
     pub index: Option<usize>,
     /// How readings belong to patterns. By default, `y` holds pairs and `d` differences.
     pub form: Option<Form>,
-    /// The field of the readings. By default `y`, or else `d`.
+    /// The field of the readings, or the two fields of patterns and of complements:
+    /// `positive,negative`. By default `y`, or else `d`.
     pub field: Option<String>,
     /// Whether patterns are along the first axis instead of the last.
     pub patterns_first: bool,
@@ -94,15 +101,15 @@ impl Readings {
 /// or pair for each row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasurementFile {
-    /// Hadamard rows of the patterns that were read, in the order shown. The side of `h_row` is
-    /// that of the image.
+    /// Hadamard rows of the patterns that were read, in the order first shown. The side of `h_row`
+    /// is that of the image.
     pub h_row: Rows,
     /// The detector's readings.
     pub readings: Readings,
     /// The imaginary parts of complex readings.
     pub imaginary: Option<Readings>,
     /// Positions in the order shown of the patterns that were read, one for each of
-    /// [`h_row`](Self::h_row).
+    /// [`h_row`](Self::h_row): the first, if a pattern was shown several times.
     pub places: Vec<usize>,
     /// Positions of patterns that were not read: the reading is NaN or an instrument's word for
     /// overload, or the row is negative.

@@ -183,7 +183,7 @@ fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<
 /// was chosen by mistake.
 pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
     if is_mat_4(start) {
-        return "a MATLAB file of level 4 (save it again as level 5: in MATLAB with save NAME -v7, in SciPy with savemat)";
+        return "a MATLAB file";
     }
     const KINDS: [(&[u8], &str); 8] = [
         (b"PK", "a zip archive"),
@@ -206,7 +206,7 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
 /// with a zero at its end.
 ///
 /// Format: MathWorks, *MAT-File Format*, R2023a, "Level 4 MAT-Files".
-fn is_mat_4(start: &[u8]) -> bool {
+pub(super) fn is_mat_4(start: &[u8]) -> bool {
     let word =
         |at: usize, of: fn([u8; 4]) -> u32| Some(of(start[4 * at..].first_chunk().copied()?));
     let head = |of: fn([u8; 4]) -> u32, order: u32| {

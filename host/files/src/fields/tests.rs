@@ -5,6 +5,7 @@ use super::*;
 const FILES: &[(&str, &[u8])] = &[
     ("level5.mat", include_bytes!("../small/level5.mat")),
     ("level5_compressed.mat", include_bytes!("../small/level5_compressed.mat")),
+    ("level4.mat", include_bytes!("../small/level4.mat")),
     #[cfg(feature = "hdf5")]
     ("level73.mat", include_bytes!("../small/level73.mat")),
     #[cfg(feature = "hdf5")]
@@ -53,7 +54,8 @@ fn bytes_that_would_become_gigabytes_of_numbers_are_refused_before_they_are_read
 
 #[test]
 fn what_is_no_array_of_numbers_is_named_only_when_it_is_asked_for() {
-    for (name, bytes) in FILES.iter().filter(|(name, _)| *name != "level73.mat") {
+    let without_text = ["level73.mat", "level4.mat"];
+    for (name, bytes) in FILES.iter().filter(|(name, _)| !without_text.contains(name)) {
         let (_folder, path) = file(name, bytes);
         let mut fields = Fields::open(&path, false).unwrap();
         let told = line(&fields.read("text", |_| Ok(())).unwrap_err(), name);
@@ -133,19 +135,33 @@ fn an_hdf5_file_that_was_cut_is_refused_wherever_it_was_cut() {
 }
 
 #[test]
-fn a_matlab_file_of_level_4_is_named_with_the_way_out() {
-    // `y`, 1 x 2 in float64, as SciPy's savemat(..., format="4") writes it, and as an old machine with the high byte first.
-    let little = [0_u32, 1, 2, 0, 2].map(u32::to_le_bytes).concat();
-    let big = [1000_u32, 1, 2, 0, 2].map(u32::to_be_bytes).concat();
-    for head in [little, big] {
-        let (_folder, path) = file("old.mat", &[&head[..], b"y\0", &[0; 16]].concat());
-        let told = line(&Fields::open(&path, false).err().unwrap(), "old.mat");
-        assert!(told.contains("a MATLAB file of level 4") && told.contains("-v7"), "{told}");
+fn arrays_in_structures_and_groups_are_named_by_their_path() {
+    let structure: &[u8] = include_bytes!("../small/nested.mat");
+    for (name, bytes, between) in [
+        ("nested.mat", structure, '.'),
+        #[cfg(feature = "hdf5")]
+        ("nested.h5", include_bytes!("../small/nested.h5"), '/'),
+    ] {
+        let (folder, path) = file(name, bytes);
+        let _kept = folder;
+        let of = |path: &str| path.replace('.', &between.to_string());
+        let mut fields = Fields::open(&path, false).unwrap();
+        assert!(fields.holds(&of("run.n")) && fields.holds(&of("run.adc.y")), "{name}");
+        assert_eq!(fields.read(&of("run.h_row"), |_| Ok(())).unwrap().real, [0.0, 3.0, 1.0]);
+        let y = fields.read(&of("run.adc.y"), |_| Ok(())).unwrap();
+        assert_eq!(y.real, [5.0, 1.0, 2.0, 3.0, 4.0, 4.5], "{name}");
+        for absent in ["run.none", "run.h_row.y", "none.y", "run.adc"] {
+            line(&fields.read(&of(absent), |_| Ok(())).unwrap_err(), name);
+        }
+        for (at, bit) in (0..bytes.len()).map(|at| (at, at % 8)) {
+            let mut changed = bytes.to_vec();
+            changed[at] ^= 1 << bit;
+            std::fs::write(&path, &changed).unwrap();
+            if let Ok(mut fields) = Fields::open(&path, false)
+                && let Err(error) = fields.read(&of("run.adc.y"), |_| Ok(()))
+            {
+                line(&error, name);
+            }
+        }
     }
-    let (_folder, path) = file(
-        "other.mat",
-        &[[9_u32, 1, 2, 0, 2].map(u32::to_le_bytes).concat(), vec![0; 18]].concat(),
-    );
-    let told = line(&Fields::open(&path, false).err().unwrap(), "other.mat");
-    assert!(!told.contains("level 4"), "{told}");
 }

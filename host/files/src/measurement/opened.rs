@@ -2,7 +2,8 @@
 
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
-use super::rows::{read_rows, read_side, shown};
+use super::rows::{Shown, read_rows, read_side, repeats, shown};
+use super::sides::make_pairs;
 use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Selection};
 use crate::field::Field;
 use crate::fields::Fields;
@@ -57,6 +58,7 @@ impl Opened {
         let default = if name == "d" { Form::Differences } else { Form::Pairs };
         let form = want.form.unwrap_or(default);
         let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
+        notes.extend(make_pairs(&mut fields, &name, want)?);
         let side_guessed = side.is_none();
         let (side, mut rows, readings) = match &want.shown {
             None => {
@@ -65,8 +67,9 @@ impl Opened {
                     let expected = "n, h_row, and y or d; or --side N";
                     return Err(FileError::Missing { path, field: "n", found, expected });
                 };
-                let rows = read_rows(&mut fields, side)?;
-                let expected = expected_of(form, rows.len());
+                let Shown { rows, shape } = read_rows(&mut fields, side)?;
+                notes.extend(repeats(&rows));
+                let expected = expected_of(form, rows.len(), shape);
                 (side, rows, NamedReadings::open(&mut fields, name, want, &expected)?)
             }
             Some(order) => {
@@ -92,7 +95,7 @@ impl Opened {
             });
         let simulated = read_simulated(&mut fields);
         let noise = is_d.then(|| read_noise(&mut fields)).flatten();
-        // A list that is not sound is refused with the first measurement.
+        // Rows that were shown several times are no list of rows.
         let every_row: Option<Vec<u32>> = rows.iter().copied().collect();
         let every_row = every_row.and_then(|rows| Rows::new(side, rows).ok());
         Ok(Self {
@@ -141,6 +144,22 @@ impl Opened {
 }
 
 impl Loaded<'_> {
+    /// The rows at these positions, each once, in the order first shown, and the positions of each.
+    fn by_row(&self, positions: &[usize]) -> (Vec<u32>, Vec<Vec<usize>>) {
+        let mut at = vec![None; self.opened.side.area()];
+        let (mut rows, mut groups) = (Vec::new(), Vec::<Vec<usize>>::new());
+        for &k in positions {
+            let Some(row) = self.opened.rows[k] else { continue };
+            let group = *at[row as usize].get_or_insert_with(|| {
+                rows.push(row);
+                groups.push(Vec::new());
+                groups.len() - 1
+            });
+            groups[group].push(k);
+        }
+        (rows, groups)
+    }
+
     /// The measurement of this index, without the patterns that were not read.
     pub(super) fn measurement(&self, index: usize) -> Result<MeasurementFile, FileError> {
         let Self { opened, numbers } = self;
@@ -164,17 +183,27 @@ impl Loaded<'_> {
             let finite = |values: &[f64]| at(k).all(|reading| is_reading(values[reading]));
             opened.rows[k].is_some() && finite(&real) && imaginary.as_deref().is_none_or(finite)
         };
-        let (places, not_read): (Vec<usize>, Vec<usize>) = (0..count).partition(|&k| is_read(k));
-        if places.is_empty() {
+        let (read, not_read): (Vec<usize>, Vec<usize>) = (0..count).partition(|&k| is_read(k));
+        if read.is_empty() {
             return Err(opened.no_pattern());
         }
         let overloaded = |k: &usize| real[*k].abs() >= OVERLOAD;
         let overloads = (0..real.len()).filter(overloaded).collect();
-        let as_they_are = not_read.is_empty() && opened.form != Form::Halves;
+        let (h_row, groups) = match &opened.every_row {
+            Some(every) if not_read.is_empty() => (every.clone(), None),
+            _ => {
+                let (rows, groups) = self.by_row(&read);
+                let rows = Rows::new(opened.side, rows).map_err(|error| {
+                    FileError::field(path, "h_row", format!("({error})"), "each row once")
+                })?;
+                (rows, Some(groups))
+            }
+        };
         let kept = |values: Vec<f64>| -> Readings {
-            let values = match as_they_are {
-                true => values,
-                false => places.iter().flat_map(|&k| at(k)).map(|at| values[at]).collect(),
+            let values = match &groups {
+                None if opened.form != Form::Halves => values,
+                None => read.iter().flat_map(|&k| at(k)).map(|at| values[at]).collect(),
+                Some(groups) => groups.iter().flat_map(|group| mean(group, at, &values)).collect(),
             };
             match opened.form {
                 Form::Pairs | Form::Halves => Readings::Pairs(values),
@@ -182,14 +211,9 @@ impl Loaded<'_> {
                 Form::Differences => Readings::Differential(values),
             }
         };
-        let h_row = match &opened.every_row {
-            Some(every) if not_read.is_empty() => every.clone(),
-            _ => {
-                let rows = places.iter().filter_map(|&k| opened.rows[k]);
-                Rows::new(opened.side, rows).map_err(|error| {
-                    FileError::field(path, "h_row", format!("({error})"), "each row once")
-                })?
-            }
+        let places = match &groups {
+            Some(groups) => groups.iter().map(|group| group[0]).collect(),
+            None => read.clone(),
         };
         Ok(MeasurementFile {
             h_row,
@@ -206,6 +230,21 @@ impl Loaded<'_> {
             notes: opened.notes.clone(),
         })
     }
+}
+
+/// The mean reading of a pattern over these positions, or the mean readings of pattern and
+/// complement; `at` gives the places of the readings of a position.
+fn mean<P: Iterator<Item = usize>>(
+    positions: &[usize],
+    at: impl Fn(usize) -> P,
+    values: &[f64],
+) -> Vec<f64> {
+    let mut sums: Vec<f64> = at(positions[0]).map(|place| values[place]).collect();
+    for &k in &positions[1..] {
+        sums.iter_mut().zip(at(k)).for_each(|(sum, place)| *sum += values[place]);
+    }
+    sums.iter_mut().for_each(|sum| *sum /= positions.len() as f64);
+    sums
 }
 
 /// Whether a number is a reading, and not a sign that there is none.

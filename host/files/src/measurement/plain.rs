@@ -2,7 +2,7 @@
 
 use super::opened::is_reading;
 use super::readings::{Expected, Hint, NamedReadings, check_infinite, readings_field};
-use super::{FileError, Selection};
+use super::{FileError, Form, Selection};
 use crate::fields::Fields;
 use std::path::Path;
 
@@ -25,7 +25,13 @@ pub fn read_plain(path: &Path, want: &Selection, patterns: usize) -> Result<Plai
     let mut fields = Fields::open(path, want.decimal_comma)?;
     let name = readings_field(&fields, want)?;
     let hint = Hint { length: 2 * patterns, words: "; of +, - pairs give the differences" };
-    let expected = Expected { length: patterns, meaning: "one reading a pattern", hint };
+    let expected = Expected {
+        form: Form::Single,
+        rows: vec![patterns as u64],
+        length: patterns,
+        meaning: "one reading a pattern",
+        hint,
+    };
     let mut readings = NamedReadings::open(&mut fields, name, want, &expected)?;
     let layout = readings.layout;
     let numbers = readings.numbers(&mut fields)?;

@@ -1,7 +1,9 @@
 //! Finds the field of a file that holds the readings, and checks the field's shape.
 
+use super::axes::joined;
 use super::form::meaning;
 use super::layout::Layout;
+use super::sides::two_fields;
 use super::{FileError, Form, Selection};
 use crate::array::has_shape;
 use crate::field::Field;
@@ -20,6 +22,9 @@ pub(super) struct NamedReadings {
 
 /// The expected shape of a field of readings.
 pub(super) struct Expected<'w> {
+    pub(super) form: Form,
+    /// The shape of the rows.
+    pub(super) rows: Vec<u64>,
     pub(super) length: usize,
     pub(super) meaning: &'w str,
     pub(super) hint: Hint<'w>,
@@ -60,8 +65,14 @@ impl NamedReadings {
         want: &Selection,
         expected: &Expected<'_>,
     ) -> Result<Self, FileError> {
-        let Expected { length, meaning, hint } = expected;
-        let fits = |shape: &[u64], length| Layout::of(shape, length, want.patterns_first).is_some();
+        let Expected { form, rows, length, meaning, hint } = expected;
+        let joined = |shape: &[u64]| match want.patterns_first {
+            true => shape.to_vec(),
+            false => joined(shape, Some(rows), *form),
+        };
+        let fits = |shape: &[u64], length| {
+            Layout::of(&joined(shape), length, want.patterns_first).is_some()
+        };
         let (shape, numbers) = fields.open_field(&name, |shape| {
             if fits(shape, *length) {
                 return Ok(());
@@ -83,14 +94,15 @@ impl NamedReadings {
             Err(format!("{axes}: {meaning}{hint}"))
         })?;
         let name = if fields.is_unnamed() { UNNAMED.to_owned() } else { name };
-        let layout = Layout::of(&shape, *length, want.patterns_first).ok_or_else(|| {
-            FileError::field(
-                fields.path(),
-                name.clone(),
-                has_shape(&shape),
-                "the shape of its header",
-            )
-        })?;
+        let layout =
+            Layout::of(&joined(&shape), *length, want.patterns_first).ok_or_else(|| {
+                FileError::field(
+                    fields.path(),
+                    name.clone(),
+                    has_shape(&shape),
+                    "the shape of its header",
+                )
+            })?;
         Ok(Self { name, numbers, layout })
     }
 }
@@ -116,7 +128,7 @@ pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String
         };
     }
     if let Some(field) = &want.field {
-        return match fields.holds(field) {
+        return match fields.holds(field) || two_fields(fields, field).is_some() {
             true => Ok(field.clone()),
             false => {
                 let expected = format!("--field with one of {}", fields.names().join(", "));
@@ -140,7 +152,7 @@ pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String
 }
 
 /// The shape that readings of this form must have for so many rows, for an error message.
-pub(super) fn expected_of(form: Form, rows: usize) -> Expected<'static> {
+pub(super) fn expected_of(form: Form, rows: usize, shape: Vec<u64>) -> Expected<'static> {
     let hint = match form {
         Form::Pairs | Form::Halves => Hint {
             length: rows,
@@ -154,7 +166,7 @@ pub(super) fn expected_of(form: Form, rows: usize) -> Expected<'static> {
             Hint { length: 2 * rows, words: "; +, - pairs are read with --readings pairs" }
         }
     };
-    Expected { length: rows * form.readings(), meaning: meaning(form), hint }
+    Expected { form, rows: shape, length: rows * form.readings(), meaning: meaning(form), hint }
 }
 
 /// Refuses infinite readings. NaN marks a pattern that was not read; an infinite reading is a

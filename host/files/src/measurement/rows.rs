@@ -1,13 +1,14 @@
 //! The side of the image and the row shown k-th, from the file or from the order that the user
 //! names.
 
+use super::axes::joined;
 use super::form::meaning;
 use super::layout::Layout;
 use super::readings::NamedReadings;
 use super::{FileError, Form, Selection};
 use crate::array::has_shape;
 use crate::fields::{Fields, UNNAMED};
-use nirspi_recon::{Order, Rows, RowsError, Side};
+use nirspi_recon::{Order, Side};
 
 /// Side, rows and readings of a file that states neither side nor rows and was shown in this order.
 pub(super) fn shown(
@@ -27,6 +28,7 @@ pub(super) fn shown(
         true => Err("readings".to_owned()),
         false => Ok(()),
     })?;
+    let shape = if want.patterns_first { shape } else { joined(&shape, None, form) };
     let mut axes = shape.iter().copied().filter(|&axis| axis != 1);
     let along = if want.patterns_first { axes.next() } else { axes.next_back() };
     let length = along.unwrap_or(1) as usize;
@@ -104,53 +106,70 @@ pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<
     }
 }
 
-/// The row shown k-th; `None` for a row that was not read.
-pub(super) fn read_rows(fields: &mut Fields, side: Side) -> Result<Vec<Option<u32>>, FileError> {
+/// The rows of a file, in the order shown.
+pub(super) struct Shown {
+    /// The row shown k-th; `None` for a row that was not read.
+    pub(super) rows: Vec<Option<u32>>,
+    /// The shape in which the file has them.
+    pub(super) shape: Vec<u64>,
+}
+
+/// The rows shown. A row may be shown several times.
+pub(super) fn read_rows(fields: &mut Fields, side: Side) -> Result<Shown, FileError> {
     const FIELD: &str = "h_row";
     let (n, area) = (side.pixels(), side.area());
-    let numbers = fields.read_real(FIELD, |shape| {
+    let field = fields.read(FIELD, |shape| {
         let axes: Vec<u64> = shape.iter().copied().filter(|&axis| axis != 1).collect();
         match axes[..] {
             [] if !shape.is_empty() => Ok(()),
-            [rows] if (1..=area as u64).contains(&rows) => Ok(()),
-            _ => Err(format!("(M,) with M from 1 to {area} for n = {n}")),
+            [rows] if rows > 0 => Ok(()),
+            [height, width] if [height, width] == [n as u64; 2] => Ok(()),
+            _ => Err(format!("(M,) or ({n}, {n}) for n = {n}")),
         }
     })?;
+    if field.imaginary.is_some() {
+        return Err(FileError::field(fields.path(), FIELD, "has complex numbers", "real numbers"));
+    }
+    let numbers = field.real;
+    let shape = field.shape.iter().map(|&axis| axis as u64).collect();
     let refuse =
         |found: String, expected: String| FileError::field(fields.path(), FIELD, found, expected);
     let expected = || {
         format!("a whole number from 0 to {} for n = {n}, or negative or NaN if not read", area - 1)
     };
-    let mut places = Vec::new();
     let mut rows: Vec<Option<u32>> = Vec::with_capacity(numbers.len());
+    let within = |row: i64| u32::try_from(row).ok().filter(|&row| (row as usize) < area);
     for (k, &value) in numbers.iter().enumerate() {
         if value.is_nan() || value < 0.0 {
             rows.push(None);
             continue;
         }
-        let row = as_integer(value).and_then(|row| u32::try_from(row).ok());
-        let row = row.ok_or_else(|| refuse(format!("is {value} at [{k}]"), expected()))?;
-        places.push((k, row));
+        let row = as_integer(value).and_then(within).ok_or_else(|| {
+            let from_one = value == area as f64 && numbers.iter().all(|&row| row != 0.0);
+            let hint = if from_one { "; counted from 1, each is one too many" } else { "" };
+            refuse(format!("is {value} at [{k}]"), format!("{}{hint}", expected()))
+        })?;
         rows.push(Some(row));
     }
-    if places.is_empty() {
-        return Err(refuse("has no row that was read".to_owned(), expected()));
+    match rows.iter().any(Option::is_some) {
+        true => Ok(Shown { rows, shape }),
+        false => Err(refuse("has no row that was read".to_owned(), expected())),
     }
-    let of_place = |index: usize| places.get(index).map_or(index, |&(k, _)| k);
-    Rows::new(side, places.iter().map(|&(_, row)| row)).map_err(|error| match error {
-        RowsError::OutOfRange { index, found, .. } => {
-            let from_one = found == area as i64 && places.iter().all(|&(_, row)| row > 0);
-            let hint = if from_one { "; counted from 1, each is one too many" } else { "" };
-            refuse(format!("is {found} at [{}]", of_place(index)), format!("{}{hint}", expected()))
-        }
-        RowsError::Repeated { index, first, row } => {
-            let (index, first) = (of_place(index), of_place(first));
-            let found = format!("repeats row {row} at [{index}], first at [{first}]");
-            refuse(found, "each row once".to_owned())
-        }
-        other => refuse(other.to_string(), expected()),
-    })?;
-    Ok(rows)
+}
+
+/// A note on rows that were shown several times, if there are any.
+pub(super) fn repeats(rows: &[Option<u32>]) -> Option<String> {
+    let mut counts = std::collections::BTreeMap::<u32, usize>::new();
+    rows.iter().flatten().for_each(|&row| *counts.entry(row).or_default() += 1);
+    let of_several = || counts.values().copied().filter(|&count| count > 1);
+    let (least, most) = (of_several().min()?, of_several().max()?);
+    let times = if least == most { most.to_string() } else { format!("{least} to {most}") };
+    let which = match of_several().count() {
+        several if several == counts.len() => "each pattern was".to_owned(),
+        1 => "one pattern was".to_owned(),
+        several => format!("{several} of {} patterns were", counts.len()),
+    };
+    Some(format!("{which} shown {times} times: the mean of its readings is used"))
 }
 
 /// The whole number that a float represents. Every row number and side is exact in float64.

@@ -1,3 +1,4 @@
+mod shapes;
 mod stack;
 
 use super::super::testing::{Zip, file, line, npy, npy_f64, npy_i32, zip};
@@ -175,12 +176,7 @@ fn each_bad_field_gets_a_line_that_names_it() {
         (
             "h_row.npy",
             npy_i32("(0,)", &[]),
-            "`h_row` has shape (0,), expected (M,) with M from 1 to 4 for n = 2",
-        ),
-        (
-            "h_row.npy",
-            npy_i32("(5,)", &[0, 1, 2, 3, 0]),
-            "`h_row` has shape (5,), expected (M,) with M from 1 to 4",
+            "`h_row` has shape (0,), expected (M,) or (2, 2) for n = 2",
         ),
         ("h_row.npy", npy_i32("(3, 2)", &[0; 6]), "`h_row` has shape (3, 2), expected (M,)"),
         (
@@ -205,15 +201,10 @@ fn each_bad_field_gets_a_line_that_names_it() {
         ),
         (
             "h_row.npy",
-            npy_i32("(4,)", &[-1, 2, 1, 2]),
-            "`h_row` repeats row 2 at [3], first at [1], expected each row once",
-        ),
-        (
-            "h_row.npy",
             npy("'<c16'", false, "(3,)", &[0; 48]),
             "`h_row` has complex numbers, expected real numbers",
         ),
-        ("h_row.npy", big.clone(), "`h_row` has shape (1000000000000,), expected (M,)"),
+        ("h_row.npy", big.clone(), "`h_row` claims shape (1000000000000,), expected at most"),
         (
             "y.npy",
             npy_f64("(5,)", &[0.0; 5]),

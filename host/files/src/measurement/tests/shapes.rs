@@ -1,0 +1,128 @@
+//! Shapes in which benches keep pattern and complement, spectra and repeated patterns.
+
+use super::super::*;
+use super::{Zip, as_is, file, line, npy_f64, npy_i32, read_members, shown, zip};
+
+/// The readings of the four patterns of 2 x 2, and of their complements.
+const PAIRS: [f64; 8] = [9.0, 1.0, 6.0, 4.0, 5.0, 5.5, 7.0, 3.0];
+
+fn field(name: &str, want: Selection) -> Selection {
+    Selection { field: Some(name.to_owned()), ..want }
+}
+
+/// A file of 2 x 2 with these fields and rows.
+fn of(
+    rows: Vec<u8>,
+    fields: Vec<(&'static str, Vec<u8>)>,
+    want: &Selection,
+) -> Result<MeasurementFile, FileError> {
+    let always = vec![("n.npy", npy_i32("()", &[2])), ("h_row.npy", rows)];
+    read_members(&[always, fields].concat(), want)
+}
+
+fn rows() -> Vec<u8> {
+    npy_i32("(4,)", &[0, 1, 2, 3])
+}
+
+#[test]
+fn pattern_and_complement_side_by_side_are_pairs() {
+    let both = of(rows(), vec![("y.npy", npy_f64("(4, 2)", &PAIRS))], &as_is()).unwrap();
+    assert_eq!(both.readings, Readings::Pairs(PAIRS.to_vec()));
+    let square = npy_i32("(2, 2)", &[0, 1, 2, 3]);
+    let spectrum = vec![("y.npy", npy_f64("(2, 2, 2)", &PAIRS))];
+    let both = of(square.clone(), spectrum, &as_is()).unwrap();
+    assert_eq!(both.readings, Readings::Pairs(PAIRS.to_vec()));
+    let d = vec![("d.npy", npy_f64("(2, 2)", &[8.0, 2.0, -0.5, 4.0]))];
+    let both = of(square, d, &as_is()).unwrap();
+    assert_eq!(both.readings, Readings::Differential(vec![8.0, 2.0, -0.5, 4.0]));
+    // Without rows in the file, and several measurements.
+    let pairs = [PAIRS.map(|v| v + 1.0), PAIRS].concat();
+    let members = vec![("y.npy", npy_f64("(2, 4, 2)", &pairs))];
+    let want = Selection { index: Some(1), ..shown(Order::Natural) };
+    let second = read_members(&members, &want).unwrap();
+    assert_eq!(second.readings, Readings::Pairs(PAIRS.to_vec()));
+}
+
+#[test]
+fn two_fields_are_named_together() {
+    let [plus, minus] = [0, 1].map(|side| PAIRS.iter().skip(side).step_by(2).copied());
+    let [plus, minus] = [plus, minus].map(|values| npy_f64("(4,)", &values.collect::<Vec<_>>()));
+    let fields = vec![("lit.npy", plus), ("dark.npy", minus)];
+    let want = field("lit,dark", as_is());
+    let both = of(rows(), fields.clone(), &want).unwrap();
+    assert_eq!(both.readings, Readings::Pairs(PAIRS.to_vec()));
+    let columns: String =
+        PAIRS.chunks(2).map(|pair| format!("{},{}\n", pair[0], pair[1])).collect();
+    let (_guard, path) = file("bench.csv", format!("positive,negative\n{columns}").as_bytes());
+    let want = field("positive, negative", shown(Order::Natural));
+    assert_eq!(read(&path, &want).unwrap().readings, Readings::Pairs(PAIRS.to_vec()));
+
+    let refused = |fields, want| line(&of(rows(), fields, &want).unwrap_err(), "lab.npz");
+    let short = vec![fields[0].clone(), ("dark.npy", npy_f64("(3,)", &[0.0; 3]))];
+    let found = refused(short, field("lit,dark", as_is()));
+    assert!(found.contains("`dark` has shape (3,), expected (4,) as `lit`"), "{found}");
+    let found = refused(fields.clone(), field("lit,darkness", as_is()));
+    assert!(found.contains("`lit,darkness` is not in the file"), "{found}");
+    let single = Selection { form: Some(Form::Single), ..field("lit,dark", as_is()) };
+    let found = refused(fields, single);
+    assert!(found.contains("names two fields, expected --readings pairs"), "{found}");
+}
+
+#[test]
+fn readings_with_a_sign_are_pairs() {
+    // The complement of row 1 comes before its pattern.
+    let readings = npy_f64("(8,)", &[9.0, 1.0, 4.0, 6.0, 5.0, 5.5, 7.0, 3.0]);
+    let sign = npy_i32("(8,)", &[1, -1, -1, 1, 1, -1, 1, -1]);
+    let both_rows = npy_i32("(8,)", &[0, 0, 1, 1, 2, 2, 3, 3]);
+    let fields = vec![("v.npy", readings.clone()), ("sign.npy", sign.clone())];
+    let found = of(both_rows.clone(), fields.clone(), &field("v", as_is())).unwrap();
+    assert_eq!(
+        (&*found.h_row, found.readings),
+        (&[0, 1, 2, 3][..], Readings::Pairs(PAIRS.to_vec()))
+    );
+    assert_eq!(found.notes, ["pairs of pattern and complement by the field `sign`"]);
+    // Without rows, the k-th pattern belongs to the k-th complement.
+    let found = read_members(&fields, &field("v", shown(Order::Natural))).unwrap();
+    assert_eq!(found.readings, Readings::Pairs(PAIRS.to_vec()));
+
+    let lonely = vec![("v.npy", readings), ("sign.npy", npy_i32("(8,)", &[1; 8]))];
+    let found = of(both_rows, lonely, &field("v", as_is())).unwrap_err();
+    let found = line(&found, "lab.npz");
+    assert!(found.contains("`sign` has a pattern at [0] and no complement for it"), "{found}");
+    // A field of that name that is no sign of readings.
+    let other = vec![("y.npy", npy_f64("(8,)", &PAIRS)), ("sign.npy", npy_i32("()", &[1]))];
+    let found = of(rows(), other, &as_is()).unwrap();
+    assert_eq!(found.readings, Readings::Pairs(PAIRS.to_vec()));
+}
+
+#[test]
+fn a_pattern_that_was_shown_several_times_has_the_mean_of_its_readings() {
+    let twice = npy_i32("(5,)", &[0, 3, 0, 1, 0]);
+    let d = |values: [f64; 5]| vec![("d.npy", npy_f64("(5,)", &values))];
+    let found = of(twice.clone(), d([8.0, 4.0, 9.0, 2.0, 10.0]), &as_is()).unwrap();
+    assert_eq!(*found.h_row, [0, 3, 1]);
+    assert_eq!(found.readings, Readings::Differential(vec![9.0, 4.0, 2.0]));
+    assert_eq!((found.places, found.patterns), (vec![0, 1, 3], 5));
+    assert_eq!(found.notes, ["one pattern was shown 3 times: the mean of its readings is used"]);
+    // What was not read does not count.
+    let found = of(twice.clone(), d([f64::NAN, 4.0, 9.0, f64::NAN, 10.0]), &as_is()).unwrap();
+    assert_eq!((&*found.h_row, found.places), (&[3, 0][..], vec![1, 2]));
+    assert_eq!(found.readings, Readings::Differential(vec![4.0, 9.5]));
+    assert_eq!(found.not_read, [0, 3]);
+    // Pairs, and halves.
+    let y = npy_f64("(10,)", &[9.0, 1.0, 7.0, 3.0, 11.0, 2.0, 6.0, 4.0, 10.0, 3.0]);
+    let found = of(twice.clone(), vec![("y.npy", y)], &as_is()).unwrap();
+    assert_eq!(found.readings, Readings::Pairs(vec![10.0, 2.0, 7.0, 3.0, 6.0, 4.0]));
+    let halves = npy_f64("(10,)", &[9.0, 7.0, 11.0, 6.0, 10.0, 1.0, 3.0, 2.0, 4.0, 3.0]);
+    let want = Selection { form: Some(Form::Halves), ..as_is() };
+    let found = of(twice.clone(), vec![("y.npy", halves)], &want).unwrap();
+    assert_eq!(found.readings, Readings::Pairs(vec![10.0, 2.0, 7.0, 3.0, 6.0, 4.0]));
+    // Several measurements are read one by one.
+    let frames = npy_f64("(2, 5)", &[8.0, 4.0, 9.0, 2.0, 10.0, 1.0, 1.0, 1.0, 1.0, 4.0]);
+    let members = [("n.npy", npy_i32("()", &[2])), ("h_row.npy", twice), ("d.npy", frames)];
+    let (_guard, path) = file("lab.npz", &zip(Zip::Stored, &members));
+    let mut several = Several::open(&path, &as_is()).unwrap();
+    assert!(several.stack().unwrap().is_none());
+    let all: Vec<_> = several.each(Ok::<_, FileError>).unwrap();
+    assert_eq!(all[1].readings, Readings::Differential(vec![2.0, 1.0, 1.0]));
+}
