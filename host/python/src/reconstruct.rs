@@ -432,6 +432,7 @@ fn of_matrix(
         let made = matrix.reconstruct(y, settings).map_err(refusal)?;
         pixels.extend_from_slice(made.image.pixels());
         let (atoms, why) = made.atoms.map(|(atoms, stop)| (atoms, format!("{stop:?}"))).unzip();
+        let method = Method::of_matrix(made.method).unwrap_or(method);
         let report = serde_json::json!({
             "method": method.argument(), "used": matrix.patterns(), "order": "as given", "warm": false,
             "rank": matrix.rank(), "unseen_pixels": matrix.unseen_pixels(),

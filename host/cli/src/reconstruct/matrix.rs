@@ -93,6 +93,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         Some(path) => path.display().to_string(),
         None => settings.basis.to_string(),
     };
+    let method = Method::of_matrix(found.method).unwrap_or(args.method.method);
     let provenance = Taken::of_file(&args.source.input, None).made(made());
     let report = Report {
         input: args.source.input.clone(),
@@ -102,8 +103,8 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         used,
         rank: own.rank(),
         unseen_pixels: own.unseen_pixels(),
-        method: args.method.method.argument(),
-        basis: args.method.method.takes(Setting::Basis).then_some(basis),
+        method: method.argument(),
+        basis: method.takes(Setting::Basis).then_some(basis),
         strength: found.strength,
         sparsity: found.atoms.map(|(size, _)| size),
         stop: found.atoms.map(|(_, stop)| args.method.atoms().reason(stop)),
@@ -115,7 +116,7 @@ pub fn run(args: &Args, path: &Path) -> Result<ExitCode> {
         stage_ms: times,
     };
     write_image(&args.out, &found.image, None, None, &report.pictures, &report)?;
-    args.report.print(&report, &provenance, |report| say(args, report))
+    args.report.print(&report, &provenance, |report| say(args, method, report))
 }
 
 fn settings(args: &Args) -> Result<MatrixSettings> {
@@ -137,7 +138,7 @@ fn settings(args: &Args) -> Result<MatrixSettings> {
     })
 }
 
-fn say(args: &Args, report: &Report) -> Result<()> {
+fn say(args: &Args, method: Method, report: &Report) -> Result<()> {
     print::line(format_args!(
         "{}: {} x {}, {} of {} patterns of {}, rank {}",
         report.input.display(),
@@ -155,7 +156,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         report.dark_level.map(|level| format!(", dark level {level:.4}")).unwrap_or_default();
     print::line(format_args!(
         "{}{basis}{atoms}{strength}{dark}, relative residual {:.3}",
-        args.method.method.name(),
+        method.name(),
         report.relative_residual
     ))?;
     print::notes(&report.notes)?;

@@ -202,6 +202,12 @@ impl Method {
         self.0.with_matrix
     }
 
+    /// The method that has this one for a user's own patterns.
+    #[must_use]
+    pub fn of_matrix(matrix: MatrixMethod) -> Option<Self> {
+        Self::ALL.iter().copied().find(|method| method.with_matrix() == Some(matrix))
+    }
+
     /// Checks the settings and prepares the method.
     ///
     /// # Errors

@@ -3,7 +3,8 @@
 //!
 //! # Invariant
 //! Nothing is assumed about the patterns. The strength of a penalty, or the number of atoms, is the
-//! one that best predicts held-back measurements, unless the caller gives it. Units do not matter
+//! one that best predicts held-back measurements, unless the caller gives it (as many
+//! orthogonal patterns as pixels: the likeliest one). Units do not matter
 //! (`tests::units_of_patterns_and_measurements_do_not_matter`). The mean of the image, which
 //! patterns of zeros and ones measure far better than any detail, has no penalty.
 //!
@@ -35,6 +36,7 @@
 //! `t` is relative to the measurements' variance, for `A` with norm 1; for total variation,
 //! relative to the standard deviation.
 
+mod complete;
 mod problem;
 mod solvers;
 
@@ -120,6 +122,10 @@ pub enum MatrixError {
 /// The method of inversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MatrixMethod {
+    /// Tikhonov's or total variation, whichever better predicts held-back measurements. Tikhonov's
+    /// for as many orthogonal patterns as pixels, for over a million weights ([`TRIED`]), for atoms of
+    /// one's own, and where the strength is given.
+    Best,
     /// Least squares of least norm.
     PseudoInverse,
     /// The minimum of a sum with a penalty.
@@ -170,6 +176,8 @@ impl MatrixSettings {
 pub struct MatrixReconstruction {
     /// The image, in the measurements' units divided by the patterns'.
     pub image: Image,
+    /// The method that made it: never [`MatrixMethod::Best`].
+    pub method: MatrixMethod,
     /// Strength of the penalty; `None` for the pseudo-inverse.
     pub strength: Option<f64>,
     /// For OMP, the number of atoms and why the pursuit stopped.
@@ -231,6 +239,9 @@ const SPLIT_SEED: u64 = 0x5eed;
 /// Squared error, relative to the least error, that counts as equally good. If patterns do not
 /// predict each other, all errors are alike.
 const AS_GOOD: f64 = 1.1;
+
+/// The most weights of all patterns for which [`MatrixMethod::Best`] tries total variation.
+pub const TRIED: usize = 1 << 20;
 
 /// Numbers of atoms to try, up to the number of measurements.
 const SPARSITIES: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 200, 300];
@@ -307,8 +318,11 @@ impl OwnMatrix {
         }
         finite("y", y, 1)?;
         self.check(settings)?;
+        let settings = &self.decided(y, settings)?;
         let every: Vec<usize> = (0..y.len()).collect();
+        let complete = complete::solve(self, y, settings);
         let (fit, strength, atoms) = match settings.method {
+            _ if let Some((fit, strength)) = complete => (fit, Some(strength), None),
             MatrixMethod::PseudoInverse => {
                 (self.pseudo_inverse(&DVector::from_column_slice(y), settings.dark), None, None)
             }
@@ -332,7 +346,11 @@ impl OwnMatrix {
                 let (fit, size, stop) = found.remove(0);
                 (fit, Some(noise), Some((size, stop)))
             }
-            MatrixMethod::Penalty(penalty) => {
+            MatrixMethod::Best | MatrixMethod::Penalty(_) => {
+                let penalty = match settings.method {
+                    MatrixMethod::Penalty(penalty) => penalty,
+                    _ => Penalty::Tikhonov,
+                };
                 // The list of strengths is the same as in the comparison, because iterative methods
                 // keep a part of their start.
                 let strengths = match settings.strength {
@@ -352,7 +370,30 @@ impl OwnMatrix {
         let left = (&y - &self.patterns * &pixels).norm();
         let residual = if y.norm() > 0.0 { left / y.norm() } else { 0.0 };
         let image = Image::new(self.side, pixels.iter().map(|&v| v as f32).collect());
-        Ok(MatrixReconstruction { image, strength, atoms, dark, residual })
+        let method = settings.method;
+        Ok(MatrixReconstruction { image, method, strength, atoms, dark, residual })
+    }
+
+    /// The settings with the method that [`MatrixMethod::Best`] stands for.
+    fn decided(&self, y: &[f64], settings: &MatrixSettings) -> Result<MatrixSettings, MatrixError> {
+        if settings.method != MatrixMethod::Best {
+            return Ok(settings.clone());
+        }
+        let with =
+            |penalty| MatrixSettings { method: MatrixMethod::Penalty(penalty), ..settings.clone() };
+        let tikhonov = with(Penalty::Tikhonov);
+        let is_known = settings.strength.is_some() || settings.atoms.is_some();
+        if is_known || self.patterns.len() > TRIED || complete::is_complete(self) {
+            return Ok(tikhonov);
+        }
+        let total_variation = with(Penalty::TotalVariation);
+        let least = |settings: &MatrixSettings, penalty| -> Result<f64, MatrixError> {
+            let errors = self.errors_of_strengths(y, settings, penalty)?;
+            Ok(errors.into_iter().fold(f64::INFINITY, f64::min))
+        };
+        let is_better = least(&total_variation, Penalty::TotalVariation)?
+            < least(&tikhonov, Penalty::Tikhonov)?;
+        Ok(if is_better { total_variation } else { tikhonov })
     }
 
     /// The image of least norm, and the dark level.

@@ -89,6 +89,11 @@ fn a_users_own_patterns_have_the_method_of_the_same_name() {
         assert_eq!(with(word), Some(MatrixMethod::Penalty(penalty)));
     }
     assert_eq!((with("hadamard"), with("prior")), (None, None));
+    for method in Method::ALL {
+        if let Some(matrix) = method.with_matrix() {
+            assert_eq!(Method::of_matrix(matrix), Some(*method));
+        }
+    }
 }
 
 #[test]

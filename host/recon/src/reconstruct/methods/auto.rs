@@ -16,8 +16,8 @@ use crate::Measurements;
 use crate::reconstruct::method::{Entry, Setting};
 use crate::reconstruct::prior::SharedNetwork;
 use crate::reconstruct::{
-    GoingOn, HeldBack, MatrixMethod, Method, MethodSettings, Penalty, Reconstruct,
-    ReconstructError, Reconstruction, Recursive, RecursiveSettings, believed_frame,
+    GoingOn, HeldBack, MatrixMethod, Method, MethodSettings, Reconstruct, ReconstructError,
+    Reconstruction, Recursive, RecursiveSettings, believed_frame,
 };
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ pub(in super::super) const METHOD: Method = Method(&Entry {
     name: NAME,
     about: "Chosen for each picture among tikhonov, fista, tv and prior, by how well each predicts held-back readings",
     takes: &[Setting::Basis, Setting::WarmStart],
-    with_matrix: Some(MatrixMethod::Penalty(Penalty::Tikhonov)),
+    with_matrix: Some(MatrixMethod::Best),
     prepare: |settings| Ok(Box::new(Auto::new(settings)?)),
 });
 

@@ -98,6 +98,108 @@ fn orthogonal_patterns_of_any_norms_are_inverted_in_one_step() {
     }
 }
 
+/// All rows of a Hadamard matrix, in units of `unit`.
+fn complete(side: Side, unit: f64) -> OwnMatrix {
+    let area = side.area();
+    let sign = |k: usize| match ((k / area) & (k % area)).count_ones().is_multiple_of(2) {
+        true => unit,
+        false => -unit,
+    };
+    OwnMatrix::new(side, &(0..area * area).map(sign).collect::<Vec<f64>>()).unwrap()
+}
+
+#[test]
+fn complete_orthogonal_patterns_have_tikhonovs_image_in_one_step() {
+    let (side, image) = (side(8), scene(side(8), 1));
+    for unit in [1.0, 1e-6, 1e6] {
+        let own = complete(side, unit);
+        let y = seen(own.patterns.transpose().as_slice(), &image, unit * 0.3);
+        for (strength, basis) in [(1e-3, Basis::Dct), (0.1, Basis::Dct), (0.01, Basis::Haar)] {
+            let tikhonov = MatrixMethod::Penalty(Penalty::Tikhonov);
+            let settings = MatrixSettings {
+                dark: false,
+                basis,
+                strength: Some(strength),
+                ..MatrixSettings::new(tikhonov)
+            };
+            let fast = own.reconstruct(&y, &settings).unwrap();
+            let slow = OwnMatrix { orthogonal: None, ..own.clone() };
+            let slow = slow.reconstruct(&y, &settings).unwrap();
+            for (a, b) in fast.image.pixels().iter().zip(slow.image.pixels()) {
+                assert!((a - b).abs() < 2e-3, "{unit}, {strength}, {basis}: {a} and {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_likeliest_strength_keeps_what_is_clear_and_leaves_out_noise() {
+    let side = side(16);
+    let own = complete(side, 1.0);
+    let weights = own.patterns.transpose();
+    for kind in [1, 2] {
+        let image = scene(side, kind);
+        let apart = |found: &Image| -> f64 {
+            let each = found.pixels().iter().zip(&image).map(|(&a, b)| (f64::from(a) - b).powi(2));
+            (each.sum::<f64>() / image.len() as f64).sqrt()
+        };
+        let of = |noise: f64, method| {
+            let y = seen(weights.as_slice(), &image, noise);
+            own.reconstruct(&y, &MatrixSettings::new(method)).unwrap()
+        };
+        let tikhonov = MatrixMethod::Penalty(Penalty::Tikhonov);
+        let clear = of(1e-3, tikhonov);
+        assert!(apart(&clear.image) < 5e-3, "{kind}: {}", apart(&clear.image));
+        // Sixteen times the noise of a pixel of the plain inverse.
+        let noisy = of(4.0, tikhonov);
+        let inverse = of(4.0, MatrixMethod::PseudoInverse);
+        assert!(
+            apart(&noisy.image) < 0.75 * apart(&inverse.image),
+            "{kind}: {} and {}",
+            apart(&noisy.image),
+            apart(&inverse.image)
+        );
+        assert!(noisy.strength > clear.strength);
+        // A dark level changes nothing.
+        let y: Vec<f64> = seen(weights.as_slice(), &image, 0.1).iter().map(|y| y + 500.0).collect();
+        let dark = own.reconstruct(&y, &MatrixSettings::new(tikhonov)).unwrap();
+        assert!((dark.dark.value() - 500.0).abs() < 5.0, "{:?}", dark.dark);
+        let without = of(0.1, tikhonov);
+        for (a, b) in dark.image.pixels().iter().zip(without.image.pixels()) {
+            assert!((a - b).abs() < 1e-3, "{a} and {b}");
+        }
+    }
+}
+
+#[test]
+fn the_best_method_is_the_one_that_predicts_held_back_measurements() {
+    let side = side(16);
+    // A letter has edges, and a soft spot has none.
+    let edges: Vec<f64> = (0..256)
+        .map(|p| f64::from(u8::from((4..12).contains(&(p / 16)) && (5..9).contains(&(p % 16)))))
+        .collect();
+    let soft: Vec<f64> = (0..256)
+        .map(|p| {
+            let from = |at: usize| (at as f64 - 7.5) / 4.0;
+            (-(from(p / 16).powi(2) + from(p % 16).powi(2))).exp()
+        })
+        .collect();
+    let best = |image: &[f64]| {
+        let (own, y) = binary(side, 128, image);
+        let of = |method| own.reconstruct(&y, &MatrixSettings::new(method)).unwrap();
+        let found = of(MatrixMethod::Best);
+        assert_eq!(found, of(found.method));
+        found.method
+    };
+    assert_eq!(best(&edges), MatrixMethod::Penalty(Penalty::TotalVariation));
+    assert_eq!(best(&soft), MatrixMethod::Penalty(Penalty::Tikhonov));
+    // With a strength, and for complete orthogonal patterns, nothing is held back.
+    let own = complete(side, 1.0);
+    let y = seen(own.patterns.transpose().as_slice(), &edges, 0.1);
+    let found = own.reconstruct(&y, &MatrixSettings::new(MatrixMethod::Best)).unwrap();
+    assert_eq!(found.method, MatrixMethod::Penalty(Penalty::Tikhonov));
+}
+
 #[test]
 fn patterns_that_share_a_little_are_not_taken_for_orthogonal() {
     let side = side(8);

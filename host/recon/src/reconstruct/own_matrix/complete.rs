@@ -1,0 +1,142 @@
+//! Tikhonov's image of as many orthogonal patterns as pixels, all of one norm, in one step.
+//!
+//! Such patterns turn the image into its measurements without a loss, so each coefficient of the image
+//! has a measurement of its own, `g = c + noise`, and its estimate is `c s^2 / (s^2 + t)`, `s` being
+//! its expected size. No measurement predicts another one except through these sizes: held-back
+//! measurements would cost most and say least. The strength `t` is the one at which the measurements
+//! are most likely, if coefficients are normal with variance `s^2` and noise with `t`, both times a
+//! common factor (evidence, or restricted likelihood: H. D. Patterson and R. Thompson, *Biometrika*
+//! 58, 545, 1971). So the finest details, which scenes hardly have, tell the noise.
+
+use super::problem::Fit;
+use super::{DarkLevel, MatrixMethod, MatrixSettings, OwnMatrix, Penalty, STRENGTHS};
+use crate::basis::{Basis, Transform};
+use nalgebra::DVector;
+
+/// Relative difference of norms that counts as rounding.
+const SAME: f64 = 1e-9;
+
+/// Part of a constant's energy outside the mean of the image below which a dark level is the mean.
+const SEEN: f64 = 1e-12;
+
+/// Strengths between two neighbours of [`STRENGTHS`].
+const BETWEEN: u32 = 4;
+
+/// The image and its strength; `None` for other patterns or settings.
+pub(super) fn solve(own: &OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Option<(Fit, f64)> {
+    let energy = energy(own)?;
+    let is_ours = settings.method == MatrixMethod::Penalty(Penalty::Tikhonov)
+        && settings.atoms.is_none()
+        && settings.basis != Basis::Pixel;
+    if !is_ours {
+        return None;
+    }
+    let transform = Transform::new(settings.basis, own.side);
+    let coefficients = |y: &DVector<f64>| -> Vec<f64> {
+        let seen = own.patterns.tr_mul(y) / energy;
+        let mut image: Vec<f32> = seen.iter().map(|&v| v as f32).collect();
+        transform.analyse(&mut image);
+        image.into_iter().map(f64::from).collect()
+    };
+    // Units in which `f32` holds the numbers, however small.
+    let unit = y.iter().fold(0.0, |most: f64, v| most.max(v.abs())).max(f64::MIN_POSITIVE);
+    let unit = unit / energy.sqrt();
+    let found = coefficients(&(DVector::from_column_slice(y) / unit));
+    let constant = coefficients(&DVector::from_element(y.len(), energy.sqrt()));
+    let frequencies = transform.basis().frequencies(own.side);
+    let sizes: Vec<f64> = frequencies.iter().map(|f| f64::from(f.max(1.0)).powi(-2)).collect();
+    // The mean has no penalty, and says nothing of the strength.
+    let details: Vec<usize> = (0..sizes.len()).filter(|&j| frequencies[j] > 0.0).collect();
+    let outside: f64 = details.iter().map(|&j| constant[j].powi(2)).sum();
+    let sees_dark = outside > SEEN * constant.iter().map(|v| v * v).sum::<f64>();
+    let model = Model { found, constant, sizes, details, fits_dark: settings.dark && sees_dark };
+    let relative = model.details.iter().map(|&j| model.sizes[j]).sum::<f64>() / y.len() as f64;
+    let strength = settings.strength.unwrap_or_else(|| model.likeliest(relative));
+
+    let noise = strength * relative;
+    let dark = model.dark(noise);
+    let mut image: Vec<f32> = (0..y.len())
+        .map(|j| {
+            let value = model.found[j] - dark * model.constant[j];
+            let share =
+                if frequencies[j] > 0.0 { model.sizes[j] / (model.sizes[j] + noise) } else { 1.0 };
+            (value * share) as f32
+        })
+        .collect();
+    transform.synthesise(&mut image);
+    let pixels = DVector::from_iterator(image.len(), image.iter().map(|&v| f64::from(v) * unit));
+    let dark = match (settings.dark, sees_dark) {
+        (false, _) => DarkLevel::LeftOut,
+        (true, false) => DarkLevel::Unknown,
+        (true, true) => DarkLevel::Fitted(dark * unit * energy.sqrt()),
+    };
+    Some((Fit { pixels, dark }, strength))
+}
+
+/// Whether [`solve`] has an image by Tikhonov's method.
+pub(super) fn is_complete(own: &OwnMatrix) -> bool {
+    energy(own).is_some()
+}
+
+/// The squared norm of every pattern.
+fn energy(own: &OwnMatrix) -> Option<f64> {
+    let energies = own.orthogonal.as_ref()?;
+    let (least, most) = (energies.min(), energies.max());
+    (energies.len() == own.side.area() && most - least <= SAME * most).then(|| energies.mean())
+}
+
+/// Coefficients with noise of the same size in each.
+struct Model {
+    found: Vec<f64>,
+    /// What a dark level adds to each.
+    constant: Vec<f64>,
+    /// Squares of the expected sizes.
+    sizes: Vec<f64>,
+    /// All coefficients except the mean.
+    details: Vec<usize>,
+    fits_dark: bool,
+}
+
+impl Model {
+    /// Sum over the details, each with its weight `1 / (s^2 + t)`.
+    fn sum(&self, noise: f64, of: impl Fn(usize) -> f64) -> f64 {
+        self.details.iter().map(|&j| of(j) / (self.sizes[j] + noise)).sum()
+    }
+
+    /// The likeliest dark level.
+    fn dark(&self, noise: f64) -> f64 {
+        match self.fits_dark {
+            true => {
+                self.sum(noise, |j| self.constant[j] * self.found[j])
+                    / self.sum(noise, |j| self.constant[j].powi(2))
+            }
+            false => 0.0,
+        }
+    }
+
+    /// The strength at which the coefficients are most likely. `relative` times a strength is the
+    /// noise.
+    fn likeliest(&self, relative: f64) -> f64 {
+        let strengths = STRENGTHS.windows(2).flat_map(|two| {
+            let ratio = (two[1] / two[0]).powf(1.0 / f64::from(BETWEEN));
+            (0..BETWEEN).map(move |k| two[0] * ratio.powi(k as i32))
+        });
+        let strengths = strengths.chain([STRENGTHS[STRENGTHS.len() - 1]]);
+        let likely = strengths.map(|strength| (self.likelihood(strength * relative), strength));
+        likely.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(STRENGTHS[0], |(_, strength)| strength)
+    }
+
+    /// Logarithm of the restricted likelihood, without what is the same for all strengths.
+    fn likelihood(&self, noise: f64) -> f64 {
+        let dark = self.dark(noise);
+        let misfit = self.sum(noise, |j| (self.found[j] - dark * self.constant[j]).powi(2));
+        let widths: f64 = self.details.iter().map(|&j| (self.sizes[j] + noise).ln()).sum();
+        let freedom = match self.fits_dark {
+            true => self.sum(noise, |j| self.constant[j].powi(2)).ln(),
+            false => 0.0,
+        };
+        let count = self.details.len() - usize::from(self.fits_dark);
+        // Coefficients of 0 have no likeliest strength.
+        -0.5 * (widths + freedom + count as f64 * misfit.max(f64::MIN_POSITIVE).ln())
+    }
+}
