@@ -123,8 +123,8 @@ pub enum MatrixError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MatrixMethod {
     /// Tikhonov's or total variation, whichever better predicts held-back measurements. Tikhonov's
-    /// for as many orthogonal patterns as pixels, for over a million weights ([`TRIED`]), for atoms of
-    /// one's own, and where the strength is given.
+    /// for as many orthogonal patterns as pixels, for over 2^20 weights, for atoms of one's own, and
+    /// where the strength is given.
     Best,
     /// Least squares of least norm.
     PseudoInverse,
@@ -241,7 +241,7 @@ const SPLIT_SEED: u64 = 0x5eed;
 const AS_GOOD: f64 = 1.1;
 
 /// The most weights of all patterns for which [`MatrixMethod::Best`] tries total variation.
-pub const TRIED: usize = 1 << 20;
+const TRIED: usize = 1 << 20;
 
 /// Numbers of atoms to try, up to the number of measurements.
 const SPARSITIES: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 200, 300];
