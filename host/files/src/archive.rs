@@ -20,10 +20,11 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// The suffix that NumPy appends to the name of an array.
 const MEMBER_SUFFIX: &str = ".npy";
-/// Members of other files that are zip archives, and what to do with these files.
-const OTHERS: [(&str, &str); 2] = [
+/// Ends of the names of members of other files that are zip archives, and what to do with these files.
+const OTHERS: [(&str, &str); 3] = [
     ("xl/workbook.xml", "a workbook of Excel (save it as CSV)"),
     ("content.xml", "a spreadsheet of OpenDocument (save it as CSV)"),
+    ("/data.pkl", "tensors of PyTorch (save the array with NumPy)"),
 ];
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
@@ -66,7 +67,7 @@ impl Archive {
         // A field of nirspi always has a name in UTF-8, so other names are skipped.
         let members: Vec<String> = zip.file_names().flatten().map(Into::into).collect();
         if let Some((_, kind)) =
-            OTHERS.iter().find(|(member, _)| members.iter().any(|name| name == member))
+            OTHERS.iter().find(|(end, _)| members.iter().any(|name| name.ends_with(end)))
         {
             return Err(FileError::kind(path, *kind, EXPECTED));
         }

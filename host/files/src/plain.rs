@@ -185,7 +185,10 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
     if is_mat_4(start) {
         return "a MATLAB file";
     }
-    const KINDS: [(&[u8], &str); 8] = [
+    if start.starts_with(b"RIFF") && start.get(8..12) == Some(b"WAVE") {
+        return "sound (.wav; save its samples with NumPy)";
+    }
+    const KINDS: &[(&[u8], &str)] = &[
         (b"PK", "a zip archive"),
         (NUMPY, "a single NumPy array (.npy)"),
         (b"\x89PNG", "a PNG image"),
@@ -193,7 +196,14 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         (b"\x89HDF", "an HDF5 file"),
         (b"\x89MCAP", "a recording (MCAP)"),
         (b"MATLAB", "a MATLAB file"),
-        (b"\x1f\x8b", "a gzip file"),
+        (b"\x1f\x8b", "a gzip file (unpack it)"),
+        (b"TDSm", "a TDMS file of LabVIEW (export it as text, or save its array with NumPy)"),
+        (b":WFM", "a waveform file of Tektronix (.isf; save it as CSV)"),
+        (b"\x0f\x0f:WFM", "a waveform file of Tektronix (.wfm; save it as CSV)"),
+        (b"\xf0\xf0:WFM", "a waveform file of Tektronix (.wfm; save it as CSV)"),
+        (b"\xd0\xcf\x11\xe0", "an old workbook of Excel (.xls; save it as CSV)"),
+        (b"\x80\x04", "a pickle of Python (save its array with NumPy)"),
+        (b"\x80\x05", "a pickle of Python (save its array with NumPy)"),
     ];
     KINDS
         .iter()

@@ -2,7 +2,7 @@
 
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
-use super::rows::{Shown, read_rows, read_side, repeats, shown};
+use super::rows::{Shown, read_rows, read_side, repeats, shown, side_of_pixels};
 use super::sides::make_pairs;
 use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Selection};
 use crate::field::Field;
@@ -69,6 +69,7 @@ impl Opened {
                 };
                 let Shown { rows, shape } = read_rows(&mut fields, side)?;
                 notes.extend(repeats(&rows));
+                notes.extend(side_of_pixels(side, &rows));
                 let expected = expected_of(form, rows.len(), shape);
                 (side, rows, NamedReadings::open(&mut fields, name, want, &expected)?)
             }

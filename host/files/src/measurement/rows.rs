@@ -172,6 +172,20 @@ pub(super) fn repeats(rows: &[Option<u32>]) -> Option<String> {
     Some(format!("{which} shown {times} times: the mean of its readings is used"))
 }
 
+/// A note on a side that is the number of pixels of a whole sweep, if it is.
+pub(super) fn side_of_pixels(side: Side, rows: &[Option<u32>]) -> Option<String> {
+    let n = side.pixels();
+    let inner = Side::new(n.isqrt() as u64).ok().filter(|inner| inner.area() == n)?.pixels();
+    let mut seen = vec![false; n];
+    rows.iter().flatten().for_each(|&row| {
+        seen.get_mut(row as usize).into_iter().for_each(|seen| *seen = true);
+    });
+    let is_sweep = rows.len() == n && seen.iter().all(|&seen| seen);
+    is_sweep.then(|| {
+        format!("n is {n} and the {n} rows are those of a sweep of {inner} x {inner}, whose n is {inner}")
+    })
+}
+
 /// The whole number that a float represents. Every row number and side is exact in float64.
 fn as_integer(value: f64) -> Option<i64> {
     (value.fract() == 0.0 && value.abs() < 2f64.powi(53)).then_some(value as i64)

@@ -284,7 +284,7 @@ fn a_useless_reconstruction_is_a_note_not_an_error() {
 
 #[test]
 fn what_is_no_measurement_file_is_named_for_what_it_is() {
-    let cases: [(&[u8], &str); 6] = [
+    let cases: [(&[u8], &str); 12] = [
         (b"", "found an empty file, expected measurements: .npz, .npy, .mat"),
         (b"\x00\x01\x02\x03", "found a file of another kind, expected measurements"),
         (
@@ -294,6 +294,12 @@ fn what_is_no_measurement_file_is_named_for_what_it_is() {
         (b"\x93NUMPY\x01\x00", "damaged or cut short"),
         (b"\x89MCAP0\r\n", "found a recording (MCAP), expected measurements"),
         (b"PK\x03\x04", "damaged or cut short"),
+        (b"TDSm\x0e\0\0\0\x69\x12", "found a TDMS file of LabVIEW (export it as text"),
+        (b"\x0f\x0f:WFM#003", "found a waveform file of Tektronix (.wfm; save it as CSV)"),
+        (b"RIFF\x24\0\0\0WAVEfmt ", "found sound (.wav; save its samples with NumPy)"),
+        (b"\x80\x04\x95\0", "found a pickle of Python (save its array with NumPy)"),
+        (b"\x1f\x8b\x08\0", "found a gzip file (unpack it)"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "found an old workbook of Excel (.xls"),
     ];
     for (bytes, expected) in cases {
         let line = line(&read_bytes(bytes, &as_is()).unwrap_err(), "lab.npz");
@@ -445,6 +451,29 @@ fn a_workbook_is_told_apart_from_an_archive_of_arrays() {
         let line = line(&read_bytes(&bytes, &as_is()).unwrap_err(), "lab.npz");
         assert!(line.contains(kind) && line.contains("save it as CSV"), "{line}");
     }
+}
+
+#[test]
+fn tensors_of_pytorch_are_told_apart_from_an_archive_of_arrays() {
+    let bytes = zip(Zip::Stored, &[("sweep/data.pkl", b"\x80\x02".to_vec())]);
+    let line = line(&read_bytes(&bytes, &as_is()).unwrap_err(), "lab.npz");
+    assert!(line.contains("found tensors of PyTorch (save the array with NumPy)"), "{line}");
+}
+
+#[test]
+fn a_side_that_is_the_number_of_pixels_is_a_note() {
+    let rows: Vec<i32> = (0..16).collect();
+    let d: Vec<f64> = rows.iter().map(|&row| 20.0 - f64::from(row)).collect();
+    let of = |n| {
+        let members = [
+            ("n.npy", npy_i32("()", &[n])),
+            ("h_row.npy", npy_i32("(16,)", &rows)),
+            ("d.npy", npy_f64("(16,)", &d)),
+        ];
+        read_members(&members, &as_is()).unwrap().notes
+    };
+    assert_eq!(of(16), ["n is 16 and the 16 rows are those of a sweep of 4 x 4, whose n is 4"]);
+    assert!(of(4).is_empty() && of(8).is_empty());
 }
 
 #[test]
