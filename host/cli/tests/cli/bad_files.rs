@@ -50,7 +50,6 @@ fn a_field_that_is_wrong_is_named_with_what_was_found_and_expected() {
         (measured.npz_with("n", Some((&[2], &[8.0, 8.0]))), &["`n` has shape (2,)", "one number"]),
         (rows(&|rows| rows[5] = 64.0), &["`h_row` is 64 at [5]", "0 to 63"]),
         (rows(&|rows| rows[5] = 0.5), &["`h_row` is 0.5 at [5]", "whole number"]),
-        (rows(&|rows| rows[5] = rows[3]), &["`h_row` repeats row", "[5]", "first at [3]"]),
         (rows(&|rows| rows.truncate(63)), &["`y` has shape (128,)", "expected (126,)"]),
         (readings(&|y| y[7] = f32::INFINITY), &["`y` is inf at [7]", "finite"]),
         (readings(&|y| y.truncate(127)), &["`y` has shape (127,)", "expected (128,)"]),
