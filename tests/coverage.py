@@ -64,6 +64,7 @@ PLACES = [
             "host/files/src/fields.rs",
             "host/files/src/hdf5.rs",
             "host/files/src/mat.rs",
+            "host/files/src/mat4.rs",
             "host/files/src/text.rs",
             "host/files/src/measurement/layout.rs",
             "host/files/src/measurement/opened.rs",

@@ -20,6 +20,7 @@ pub const LAWS: &[Law] = &[
             "host/files/src/fields.rs",
             "host/files/src/archive.rs",
             "host/files/src/mat.rs",
+            "host/files/src/mat4.rs",
             "host/files/src/hdf5.rs",
             "host/files/src/text.rs",
             "host/files/src/text/export.rs",
@@ -38,6 +39,7 @@ pub const LAWS: &[Law] = &[
             "host/files/src/measurement/readings.rs",
             "host/files/src/measurement/reference.rs",
             "host/files/src/measurement/rows.rs",
+            "host/files/src/measurement/sides.rs",
             "host/files/src/measurement/stack.rs",
             "host/files/src/array.rs",
             "host/files/src/stored.rs",
@@ -50,10 +52,13 @@ pub const LAWS: &[Law] = &[
     },
     Law {
         name: "matlab",
-        reads: "a `.mat` file of level 5",
-        readers: &["host/files/src/mat.rs"],
+        reads: "a `.mat` file of level 4 or 5",
+        readers: &["host/files/src/mat.rs", "host/files/src/mat4.rs"],
         holds: files,
-        seeds: || vec![small("level5.mat"), small("level5_compressed.mat")],
+        seeds: || {
+            let files = ["level5.mat", "level5_compressed.mat", "level4.mat", "nested.mat"];
+            files.map(small).to_vec()
+        },
         longest: 4096,
         most_memory: MEMORY,
     },
@@ -62,7 +67,7 @@ pub const LAWS: &[Law] = &[
         reads: "an HDF5 file, MATLAB's `.mat` 7.3 among them",
         readers: &["host/files/src/hdf5.rs"],
         holds: files,
-        seeds: || vec![small("h5py.h5"), small("level73.mat")],
+        seeds: || ["h5py.h5", "level73.mat", "nested.h5"].map(small).to_vec(),
         longest: 12_288,
         most_memory: MEMORY,
     },
