@@ -11,7 +11,7 @@ pub(super) fn joined(shape: &[u64], rows: Option<&[u64]>, form: Form) -> Vec<u64
     let mut last = match rows {
         Some(rows) => long(rows),
         // Without rows, the axis before the pairs is that of the patterns.
-        None if axes.len() < 2 => return axes,
+        None if axes.len() < 2 => return shape.to_vec(),
         None => vec![axes[axes.len() - 2]],
     };
     if form == Form::Pairs {
@@ -22,7 +22,7 @@ pub(super) fn joined(shape: &[u64], rows: Option<&[u64]>, form: Form) -> Vec<u64
             let one = last.iter().fold(1_u64, |product, &axis| product.saturating_mul(axis));
             [before, &[one]].concat()
         }
-        _ => axes,
+        _ => shape.to_vec(),
     }
 }
 
@@ -50,6 +50,9 @@ mod tests {
             (&[2, 256], Some(&[128]), Form::Halves),
             (&[16, 16], None, Form::Single),
             (&[512], None, Form::Pairs),
+            (&[1], Some(&[1]), Form::Differences),
+            (&[1, 1], Some(&[1]), Form::Single),
+            (&[1, 2], Some(&[1]), Form::Pairs),
             (&[], None, Form::Pairs),
         ] {
             assert_eq!(joined(shape, rows, form), shape, "{rows:?} {form:?}");

@@ -126,3 +126,12 @@ fn a_pattern_that_was_shown_several_times_has_the_mean_of_its_readings() {
     let all: Vec<_> = several.each(Ok::<_, FileError>).unwrap();
     assert_eq!(all[1].readings, Readings::Differential(vec![2.0, 1.0, 1.0]));
 }
+
+#[test]
+fn one_pattern_is_a_measurement_however_many_axes_it_has() {
+    for shape in ["(1,)", "(1, 1)"] {
+        let d = vec![("d.npy", npy_f64(shape, &[4.0]))];
+        let found = of(npy_i32("(1,)", &[0]), d, &as_is()).unwrap();
+        assert_eq!(found.readings, Readings::Differential(vec![4.0]), "{shape}");
+    }
+}
