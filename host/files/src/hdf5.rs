@@ -16,8 +16,8 @@ const EXPECTED: &str = "an HDF5 file";
 const MAX_FIELD_BYTES: usize = 256 << 20;
 /// The most groups around an array that has a name.
 const MAX_DEPTH: usize = 8;
-/// The number of names from which on no further group is opened.
-const MAX_NAMES: usize = 1000;
+/// The most groups that are opened for the names of their arrays.
+const MAX_GROUPS: usize = 1000;
 
 /// An open file.
 pub(super) struct Hdf5 {
@@ -49,17 +49,25 @@ impl Hdf5 {
         // MATLAB keeps parts of cell arrays in a group of its own.
         let is_hidden = |name: &str| self.is_matlab && name.starts_with('#');
         let mut names = Vec::new();
-        let mut groups = vec![(String::new(), 0, self.file.root_group().map_err(explain)?)];
-        // A group can hold itself: what is deeper has no name.
+        let root = self.file.root_group().map_err(explain)?;
+        let (mut opened, mut groups) = (0, vec![(String::new(), 0, root)]);
+        // A group can hold itself, and many times: what is deeper has no name, nor what comes later.
         while let Some((path, depth, group)) = groups.pop() {
-            let (inner, arrays) = group.member_names().map_err(explain)?;
+            let (inner, arrays) = match group.member_names() {
+                Ok(members) => members,
+                // A damaged group does not take the arrays outside it along.
+                Err(_) if depth > 0 => continue,
+                Err(error) => return Err(explain(error)),
+            };
             names.extend(arrays.into_iter().map(|name| format!("{path}{name}")));
             for name in inner.into_iter().filter(|name| !is_hidden(name)) {
-                if depth == MAX_DEPTH || names.len() >= MAX_NAMES {
+                if depth == MAX_DEPTH || opened == MAX_GROUPS {
                     break;
                 }
-                let group = group.group(&name).map_err(explain)?;
-                groups.push((format!("{path}{name}{between}"), depth + 1, group));
+                opened += 1;
+                if let Ok(group) = group.group(&name) {
+                    groups.push((format!("{path}{name}{between}"), depth + 1, group));
+                }
             }
         }
         Ok(names)

@@ -7,7 +7,8 @@
 //!
 //! Every claim of a header is checked before it is used, and memory grows with the bytes that
 //! arrived. A compressed variable is decompressed only when its field is read, and only up to a
-//! limit.
+//! limit; structures are decompressed once more for the names of their fields, up to the same limit
+//! for all of them together.
 
 use super::FileError;
 use super::array::{MAX_AXES, has_shape, within_memory};
@@ -49,7 +50,7 @@ pub(super) struct Mat {
 
 struct Variable {
     name: String,
-    /// The paths of the fields of a structure that are none themselves.
+    /// Of a structure, the paths of all fields that are not structures themselves.
     fields: Vec<String>,
     /// Start of the matrix's content, compressed or not.
     start: usize,
@@ -91,6 +92,7 @@ impl Mat {
         let is_big_endian = bytes[126] == b'M';
         let mut mat = Self { path: path.to_owned(), bytes, is_big_endian, variables: Vec::new() };
         let mut start = HEADER_BYTES;
+        let mut listed_bytes = 0;
         while start < mat.bytes.len() {
             let (kind, data, end) = mat.variable_at(start)?;
             let (content, is_compressed) = (&mat.bytes[data..end], kind == COMPRESSED);
@@ -113,7 +115,11 @@ impl Mat {
                 let mut variable =
                     Variable { name, fields: Vec::new(), start: data, end, is_compressed };
                 // Damage is reported when a field of this structure is read.
-                if is_structure && let Ok(matrix) = mat.unpacked(&variable) {
+                if is_structure
+                    && listed_bytes < MAX_VARIABLE_BYTES
+                    && let Ok(matrix) = mat.unpacked(&variable)
+                {
+                    listed_bytes += matrix.len() as u64;
                     mat.list(&matrix, "", MAX_DEPTH, &mut variable.fields);
                 }
                 mat.variables.push(variable);

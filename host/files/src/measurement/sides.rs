@@ -47,7 +47,8 @@ pub(super) fn make_pairs(
     by_sign(fields, name)
 }
 
-/// Makes pairs of readings with a sign. A field of another length is none of readings.
+/// Makes pairs of readings with a sign. Nothing is done if the field `sign` has another length than
+/// the readings: then it does not belong to them.
 fn by_sign(fields: &mut Fields, name: &str) -> Result<Option<String>, FileError> {
     let any = |_: &[u64]| Ok(());
     let (sign, readings) = (fields.read(SIGN, any)?, fields.read(name, any)?);

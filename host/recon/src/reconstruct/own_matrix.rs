@@ -374,7 +374,8 @@ impl OwnMatrix {
         Ok(MatrixReconstruction { image, method, strength, atoms, dark, residual })
     }
 
-    /// The settings with the method that [`MatrixMethod::Best`] stands for.
+    /// The same settings, with [`MatrixMethod::Best`] replaced by the method that it chooses for these
+    /// measurements.
     fn decided(&self, y: &[f64], settings: &MatrixSettings) -> Result<MatrixSettings, MatrixError> {
         if settings.method != MatrixMethod::Best {
             return Ok(settings.clone());
