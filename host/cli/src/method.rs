@@ -121,7 +121,7 @@ impl MethodArgs {
 
     /// The requested settings for images of this side. Reads the user's files.
     pub fn settings_for(&self, side: usize) -> Result<MethodSettings> {
-        let read = |path: &PathBuf| anyhow::Ok(own_atoms(path, read_atoms(path, side)?));
+        let read = |path: &PathBuf| anyhow::Ok(own_atoms(path, read_atoms(path, (side, side))?));
         let dictionary = self.dictionary.as_ref().map(read).transpose()?;
         Ok(MethodSettings { dictionary, ..self.settings()? })
     }

@@ -17,7 +17,7 @@ use nirspi::capture::Capture;
 use nirspi::files::output::OutputDir;
 use nirspi::reconstruct::{OneError, OneImage, OneReport, one_image as one};
 use nirspi::source::{FirstPatterns, Index, Source};
-use nirspi_recon::Sampling;
+use nirspi_recon::{Sampling, Size};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -45,11 +45,20 @@ pub struct Args {
     order: Option<String>,
     #[command(flatten)]
     method: MethodArgs,
-    /// Patterns of your own instead of Hadamard rows: (M, n * n) weights, one pattern in each row. `y` in the input then has
-    /// one reading for each pattern, and --strength is relative to the variance of the readings
-    #[arg(long, value_name = "NPY", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed",
-          "non_differential", "readings", "shown", "side", "transpose", "keep_leak", "warm_start"])]
+    /// Patterns of your own instead of Hadamard rows: a file of any format with one pattern in each row, (M, height * width),
+    /// or one picture for each pattern, (M, height, width), or a folder of PNG files. `y` in the input then has one reading
+    /// for each pattern, or pattern and complement side by side, (M, 2); --readings names other forms. --strength is relative
+    /// to the variance of the readings
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed", "shown", "side",
+          "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
+    /// With --matrix: height and width of the image, such as 12x15, if patterns are rows and the image is no square
+    #[arg(long, value_name = "HEIGHTxWIDTH", requires = "matrix")]
+    size: Option<Size>,
+    /// With --matrix: the array of the patterns, in a file of several [default: patterns or matrix, or the only array of two or
+    /// three axes]
+    #[arg(long, value_name = "NAME", requires = "matrix")]
+    matrix_field: Option<String>,
     /// With --matrix: fit no dark level. By default one constant (ambient light, the offset of an amplifier) is fitted with
     /// the image
     #[arg(long, requires = "matrix")]

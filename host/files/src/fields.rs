@@ -176,6 +176,14 @@ impl Fields {
         Ok((shape.into_iter().map(|axis| axis as u64).collect(), numbers))
     }
 
+    /// The field as [`read`](Self::read) gives it, of any shape, as the last one that is needed.
+    pub(super) fn into_field(mut self, field: &str) -> Result<Field, FileError> {
+        match self.format {
+            Format::Unnamed(numbers) => Ok(numbers),
+            _ => self.read(field, |_| Ok(())),
+        }
+    }
+
     /// A field whose real numbers lie in the file as they are; `None` for any other field.
     pub(super) fn stored(&mut self, field: &str) -> Result<Option<Stored>, FileError> {
         match &mut self.format {

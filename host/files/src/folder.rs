@@ -1,6 +1,7 @@
 //! The measurement files that a user names: files, and all that are in a folder.
 
 use super::FileError;
+use std::cmp::Ordering;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -61,6 +62,28 @@ fn collect(
     Ok(())
 }
 
+/// The order of two files whose names count: `p2` before `p10`.
+pub(super) fn by_number(one: &Path, other: &Path) -> Ordering {
+    let (one, other) = (one.to_string_lossy(), other.to_string_lossy());
+    parts(&one).cmp(parts(&other)).then_with(|| one.cmp(&other))
+}
+
+/// A name in parts: each number, without leading zeros, by its length and digits, and each other
+/// character.
+fn parts(name: &str) -> impl Iterator<Item = (usize, &str)> {
+    let mut left = name;
+    std::iter::from_fn(move || {
+        let first = left.chars().next()?;
+        let digits = left.bytes().take_while(u8::is_ascii_digit).count();
+        let (part, rest) = left.split_at(digits.max(first.len_utf8()));
+        left = rest;
+        Some(match digits {
+            0 => (0, part),
+            _ => (1 + part.trim_start_matches('0').len(), part.trim_start_matches('0')),
+        })
+    })
+}
+
 fn is_measurement(path: &Path) -> bool {
     let ending = path.extension().map(OsStr::to_ascii_lowercase);
     ENDINGS.iter().any(|known| ending.as_deref().is_some_and(|ending| ending == *known))
@@ -79,6 +102,13 @@ mod tests {
         let names = [root.path().join("a.npz"), odd, root.path().join("c.npz")];
         names.iter().for_each(|name| std::fs::write(name, "x").unwrap());
         assert_eq!(measurement_files(&[root.path().to_owned()]).unwrap(), names);
+    }
+
+    #[test]
+    fn names_that_count_are_in_the_order_of_their_numbers() {
+        let mut names = ["p10", "p9", "p009b", "p1", "q0", "p", "p01"].map(Path::new);
+        names.sort_by(|a, b| by_number(a, b));
+        assert_eq!(names, ["p", "p01", "p1", "p9", "p009b", "p10", "q0"].map(Path::new));
     }
 
     #[test]

@@ -9,7 +9,6 @@ use super::FileError;
 use super::array::{ArrayError, Header, MAGIC, MAX_AXES, NUMBERS, Sample, shape_text};
 use super::field::Field;
 use super::plain::{kind_by_start, open_file};
-use std::borrow::Cow;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
@@ -98,58 +97,6 @@ fn finite(path: &Path, stack: Stack) -> Result<Stack, FileError> {
 pub fn read_list(path: &Path) -> Result<Vec<f64>, FileError> {
     let fits = |shape: &[u64]| matches!(shape, [count] if *count > 0);
     Ok(read_numbers(path, EXPECTED_LIST, fits, "(N,)")?.1)
-}
-
-/// A matrix, row-major.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Matrix {
-    /// Number of rows, at least 1.
-    pub rows: usize,
-    /// Number of columns, at least 1.
-    pub columns: usize,
-    /// `rows * columns` finite values.
-    pub values: Vec<f64>,
-}
-
-impl Matrix {
-    /// The values of these rows, one after another. If all rows are selected, nothing is copied.
-    ///
-    /// # Panics
-    /// If a row does not exist.
-    #[must_use]
-    pub fn select(&self, rows: &[usize]) -> Cow<'_, [f64]> {
-        let first = rows.iter().copied().eq(0..rows.len());
-        match first {
-            true => Cow::Borrowed(&self.values[..rows.len() * self.columns]),
-            false => rows
-                .iter()
-                .flat_map(|row| &self.values[row * self.columns..(row + 1) * self.columns])
-                .copied()
-                .collect(),
-        }
-    }
-}
-
-/// Reads a `.npy` file of patterns, of shape `(M, N)`, or `(M, n, n)` for patterns as pictures; any
-/// real dtype.
-///
-/// # Errors
-/// [`FileError`], one line that names file, what was found and what was expected.
-pub fn read_matrix(path: &Path) -> Result<Matrix, FileError> {
-    let fits = |shape: &[u64]| match *shape {
-        [_, height, width] => height == width && !shape.contains(&0),
-        _ => shape.len() == 2 && !shape.contains(&0),
-    };
-    let expected = "a NumPy array (.npy) of patterns, (M, N) or (M, n, n)";
-    let of_shape = "(M, N), a pattern a row, or (M, n, n), a picture a pattern";
-    let (header, values) = read_numbers::<f64>(path, expected, fits, of_shape)?;
-    let rows = header.shape()[0] as usize;
-    let columns = values.len() / rows;
-    if let Some(flat) = values.iter().position(|value| !value.is_finite()) {
-        let found = format!("is {} at [{}, {}]", values[flat], flat / columns, flat % columns);
-        return Err(refuse(path, found, "finite numbers"));
-    }
-    Ok(Matrix { rows, columns, values })
 }
 
 fn read(path: &Path) -> Result<(Header, Stack), FileError> {

@@ -14,7 +14,7 @@ use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
     Reconstruction, Report, Setting, Sparsity, Strength, stack_while,
 };
-use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Side};
+use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Side, Size};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -387,7 +387,7 @@ pub fn reconstruct_file<'py>(
 #[pyfunction]
 pub fn reconstruct_matrix<'py>(
     py: Python<'py>,
-    n: u64,
+    size: (usize, usize),
     weights: PyReadonlyArray1<'py, f64>,
     y: PyReadonlyArray1<'py, f64>,
     options: &Bound<'py, PyDict>,
@@ -409,20 +409,21 @@ pub fn reconstruct_matrix<'py>(
         dark: options.dark,
         ..MatrixSettings::new(how)
     };
-    let (side, weights, y) = (side(n)?, slice(&weights)?, slice(&y)?);
-    let (pixels, reports) = long(py, |stop| of_matrix(side, weights, y, method, &settings, stop))?;
+    let size = Size::new(size.0, size.1).map_err(refusal)?;
+    let (weights, y) = (slice(&weights)?, slice(&y)?);
+    let (pixels, reports) = long(py, |stop| of_matrix(size, weights, y, method, &settings, stop))?;
     Ok((array(py, pixels), reports))
 }
 
 fn of_matrix(
-    side: Side,
+    size: Size,
     weights: &[f64],
     y: &[f64],
     method: Method,
     settings: &MatrixSettings,
     stop: &AtomicBool,
 ) -> PyResult<(Vec<f32>, Vec<String>)> {
-    let matrix = OwnMatrix::new(side, weights).map_err(refusal)?;
+    let matrix = OwnMatrix::new(size, weights).map_err(refusal)?;
     whole("y", y.len(), matrix.patterns())?;
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     for y in y.chunks_exact(matrix.patterns()) {

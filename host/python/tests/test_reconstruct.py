@@ -163,6 +163,21 @@ def test_patterns_of_ones_own(random):
     assert least.shape == (2, 16, 16) and np.allclose(least[1], expected, atol=1e-3)
 
 
+def test_patterns_of_any_height_and_width(random):
+    patterns = (random.random((170, 12, 15)) > 0.5).astype(float)
+    image = np.zeros((12, 15))
+    image[3:9, 2:7] = 1
+    image[6:, 9:12] = 0.5
+    y = np.tensordot(patterns, image, 2)
+    found = ns.reconstruct(y, matrix=patterns)
+    assert found.shape == (12, 15) and ns.metrics.correlation(image, found) > 0.98
+    flat = ns.reconstruct([y, y], matrix=patterns.reshape(170, -1), n=(12, 15), method="tikhonov")
+    assert flat.shape == (2, 12, 15) and flat[1]._repr_png_().startswith(b"\x89PNG")
+    assert flat._repr_png_() is None
+    with pytest.raises(ns.Error, match="expected square images: draw images"):
+        flat.png()
+
+
 def test_images_are_in_the_units_of_the_readings_and_never_clipped():
     m = measured()
     m.d = m.d * -1e6

@@ -6,26 +6,26 @@
 //! (`tests::atoms_are_orthonormal`), so energies, angles and least squares are the same for pixels
 //! and for coefficients.
 //!
-//! Atoms are numbered row-major over the `n x n` grid of coefficients, the mean of the image first.
+//! Atoms are numbered row-major over a grid of coefficients with the size of the image, the mean first.
 
 mod wavelet;
 
 pub(crate) use wavelet::merge;
 
-use crate::Side;
+use crate::{Shape, Side, Size};
 use pulp::{Arch, Simd, WithSimd};
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
-/// An orthonormal basis of `n x n` images.
+/// An orthonormal basis of images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Basis {
     /// Single pixels.
     Pixel,
     /// 2-D discrete cosine transform (type II; N. Ahmed et al., *Discrete cosine transform*, 1974).
-    /// Atom `n * u + v` has `u` half periods down and `v` across.
+    /// Atom `width * u + v` has `u` half periods down and `v` across.
     Dct,
     /// 2-D Haar wavelets (S. Mallat's square pyramid, *A theory for multiresolution signal
     /// decomposition*, 1989; A. Haar, 1910).
@@ -90,18 +90,26 @@ impl Basis {
         }
     }
 
-    /// Spatial frequency of every atom, in half periods per image side. The mean has frequency 0. A
-    /// single pixel has no one frequency; its entry is 1.
+    /// Whether images of this size have the basis: wavelets are those of a [`Side`].
     #[must_use]
-    pub fn frequencies(self, side: Side) -> Vec<f32> {
-        let n = side.pixels();
+    pub fn fits(self, size: impl Shape) -> bool {
+        self.taps().is_none() || size.into().side().is_some()
+    }
+
+    /// Spatial frequency of every atom, in half periods per longer side of the image. The mean has
+    /// frequency 0. A single pixel has no one frequency; its entry is 1.
+    #[must_use]
+    pub fn frequencies(self, size: impl Shape) -> Vec<f32> {
+        let size: Size = size.into();
+        let longer = size.height().max(size.width()) as f32;
+        let (down, across) = (longer / size.height() as f32, longer / size.width() as f32);
         let octave = |index: usize| if index == 0 { 0 } else { 1 << index.ilog2() };
-        (0..side.area())
+        (0..size.area())
             .map(|atom| {
-                let (u, v) = (atom / n, atom % n);
+                let (u, v) = (atom / size.width(), atom % size.width());
                 match self {
                     Self::Pixel => 1.0,
-                    Self::Dct => (u as f32).hypot(v as f32),
+                    Self::Dct => (down * u as f32).hypot(across * v as f32),
                     Self::Haar | Self::Daubechies4 => octave(u.max(v)) as f32,
                 }
             })
@@ -109,29 +117,63 @@ impl Basis {
     }
 }
 
-/// A basis prepared for images of one side.
+/// A basis prepared for images of one size: of one side by default, or of any [`Size`].
 #[derive(Debug, Clone)]
-pub struct Transform {
+pub struct Transform<S = Side> {
     basis: Basis,
-    side: Side,
-    /// Orthonormal DCT-II matrix and its transpose, row-major; empty for other bases.
-    cosines: Vec<f32>,
-    cosines_transposed: Vec<f32>,
+    shape: S,
+    /// For the columns and for the rows of an image; empty for other bases than the DCT.
+    down: Cosines,
+    across: Cosines,
+}
+
+/// The orthonormal DCT-II matrix of some length, and its transpose, row-major.
+#[derive(Debug, Clone, Default)]
+struct Cosines {
+    matrix: Vec<f32>,
+    transposed: Vec<f32>,
+}
+
+impl Cosines {
+    fn new(length: usize) -> Self {
+        let entries = 0..length * length;
+        let entry = |p: usize| cosine(length, p / length, p % length) as f32;
+        let mirrored = |p: usize| cosine(length, p % length, p / length) as f32;
+        let matrix = entries.clone().map(entry).collect();
+        Self { matrix, transposed: entries.map(mirrored).collect() }
+    }
 }
 
 impl Transform {
     /// Prepares `basis` for images of this side.
     #[must_use]
     pub fn new(basis: Basis, side: Side) -> Self {
-        let n = side.pixels();
-        let (mut cosines, mut cosines_transposed) = (Vec::new(), Vec::new());
-        if basis == Basis::Dct {
-            let entry = |p: usize| cosine(n, p / n, p % n) as f32;
-            let mirrored = |p: usize| cosine(n, p % n, p / n) as f32;
-            cosines = (0..side.area()).map(entry).collect();
-            cosines_transposed = (0..side.area()).map(mirrored).collect();
-        }
-        Self { basis, side, cosines, cosines_transposed }
+        Self::prepared(basis, side)
+    }
+
+    /// The side of the images.
+    #[must_use]
+    pub fn side(&self) -> Side {
+        self.shape
+    }
+}
+
+impl Transform<Size> {
+    /// Prepares `basis` for images of this size, if they have the basis ([`Basis::fits`]).
+    #[must_use]
+    pub fn of_size(basis: Basis, size: Size) -> Option<Self> {
+        basis.fits(size).then(|| Self::prepared(basis, size))
+    }
+}
+
+impl<S: Shape> Transform<S> {
+    fn prepared(basis: Basis, shape: S) -> Self {
+        let size: Size = shape.into();
+        let (down, across) = match basis {
+            Basis::Dct => (Cosines::new(size.height()), Cosines::new(size.width())),
+            _ => Default::default(),
+        };
+        Self { basis, shape, down, across }
     }
 
     /// The basis.
@@ -140,55 +182,48 @@ impl Transform {
         self.basis
     }
 
-    /// The side of the images.
-    #[must_use]
-    pub fn side(&self) -> Side {
-        self.side
-    }
-
     /// Replaces a row-major image by its coefficients.
     ///
     /// # Panics
-    /// If the length of `image` is not `side^2`.
+    /// If the length of `image` is not that of the shape.
     pub fn analyse(&self, image: &mut [f32]) {
-        self.check(image);
+        let size = self.check(image);
         match self.basis.taps() {
-            Some(taps) => wavelet::analyse(taps, self.side.pixels(), image),
+            Some(taps) => wavelet::analyse(taps, size.width(), image),
             None if self.basis == Basis::Pixel => {}
-            None => self.separable(&self.cosines, &self.cosines_transposed, image),
+            None => separable(&self.down.matrix, &self.across.transposed, size, image),
         }
     }
 
     /// Replaces coefficients by their row-major image.
     ///
     /// # Panics
-    /// If the length of `coefficients` is not `side^2`.
+    /// If the length of `coefficients` is not that of the shape.
     pub fn synthesise(&self, coefficients: &mut [f32]) {
-        self.check(coefficients);
+        let size = self.check(coefficients);
         match self.basis.taps() {
-            Some(taps) => wavelet::synthesise(taps, self.side.pixels(), coefficients),
+            Some(taps) => wavelet::synthesise(taps, size.width(), coefficients),
             None if self.basis == Basis::Pixel => {}
-            None => self.separable(&self.cosines_transposed, &self.cosines, coefficients),
+            None => separable(&self.down.transposed, &self.across.matrix, size, coefficients),
         }
     }
 
-    fn check(&self, image: &[f32]) {
-        let n = self.side.pixels();
-        assert_eq!(image.len(), self.side.area(), "pixels of a {n} x {n} image");
-    }
-
-    /// `left * x * right`.
-    fn separable(&self, left: &[f32], right: &[f32], x: &mut [f32]) {
-        let n = self.side.pixels();
-        let mut half = vec![0.0; x.len()];
-        product(n, n, left, x, &mut half);
-        x.fill(0.0);
-        product(n, n, &half, right, x);
+    fn check(&self, image: &[f32]) -> Size {
+        let size = self.shape.into();
+        assert_eq!(image.len(), size.area(), "pixels of a {size} image");
+        size
     }
 }
 
-/// Adds `a * b` to `out`, all row-major, `a` with `inner` columns (an even number) and `b` with
-/// `columns`.
+/// `left * x * right`.
+fn separable(left: &[f32], right: &[f32], size: Size, x: &mut [f32]) {
+    let mut half = vec![0.0; x.len()];
+    product(size.height(), size.width(), left, x, &mut half);
+    x.fill(0.0);
+    product(size.width(), size.width(), &half, right, x);
+}
+
+/// Adds `a * b` to `out`, all row-major, `a` with `inner` columns and `b` with `columns`.
 pub(crate) fn product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &mut [f32]) {
     Arch::new().dispatch(Product { inner, columns, a, b, out });
 }
@@ -216,10 +251,16 @@ impl WithSimd for Product<'_> {
 fn add_product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &mut [f32]) {
     for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
         // Two rows of b at a time halve the memory traffic of `out`.
-        for (pair, b) in a.as_chunks::<2>().0.iter().zip(b.chunks_exact(2 * columns)) {
+        let (pairs, last) = a.as_chunks::<2>();
+        for (pair, b) in pairs.iter().zip(b.chunks_exact(2 * columns)) {
             let (first, second) = b.split_at(columns);
             for ((out, b0), b1) in out.iter_mut().zip(first).zip(second) {
                 *out += pair[0] * b0 + pair[1] * b1;
+            }
+        }
+        for last in last {
+            for (out, b) in out.iter_mut().zip(&b[(inner - 1) * columns..]) {
+                *out += last * b;
             }
         }
     }
@@ -266,24 +307,46 @@ mod tests {
 
     #[test]
     fn atoms_are_orthonormal() {
-        let side = side(8);
-        for basis in ALL {
-            let transform = Transform::new(basis, side);
-            let atoms: Vec<Vec<f32>> = (0..64)
-                .map(|atom| {
-                    let mut x = vec![0.0; 64];
-                    x[atom] = 1.0;
-                    transform.synthesise(&mut x);
-                    x
-                })
-                .collect();
-            for (i, a) in atoms.iter().enumerate() {
-                for (j, b) in atoms.iter().enumerate() {
-                    let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-                    let expected = if i == j { 1.0 } else { 0.0 };
-                    assert!((dot - expected).abs() < 1e-5, "{basis} atoms {i} and {j}");
-                }
+        for (height, width) in [(8, 8), (5, 7), (6, 4), (1, 9), (3, 1)] {
+            let size = Size::new(height, width).unwrap();
+            for basis in ALL.into_iter().filter(|basis| basis.fits(size)) {
+                orthonormal(&Transform::of_size(basis, size).unwrap());
             }
+            assert_eq!(Basis::Haar.fits(size), height == 8);
+        }
+    }
+
+    fn orthonormal(transform: &Transform<Size>) {
+        let (basis, area) = (transform.basis(), transform.shape.area());
+        let atoms: Vec<Vec<f32>> = (0..area)
+            .map(|atom| {
+                let mut x = vec![0.0; area];
+                x[atom] = 1.0;
+                transform.synthesise(&mut x);
+                x
+            })
+            .collect();
+        for (i, a) in atoms.iter().enumerate() {
+            for (j, b) in atoms.iter().enumerate() {
+                let dot: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+                let expected = if i == j { 1.0 } else { 0.0 };
+                assert!((dot - expected).abs() < 1e-5, "{basis} atoms {i} and {j}");
+            }
+            let mut x = a.clone();
+            transform.analyse(&mut x);
+            assert!((x[i] - 1.0).abs() < 1e-5, "{basis} atom {i}");
+        }
+    }
+
+    /// A wave has the same frequency across an image and down its transpose.
+    #[test]
+    fn frequencies_are_in_half_periods_per_longer_side() {
+        let [wide, high] = [(2, 6), (6, 2)].map(|(h, w)| Size::new(h, w).unwrap());
+        let [across, down] = [wide, high].map(|size| Basis::Dct.frequencies(size));
+        assert_eq!(across[..6], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(across[6], 3.0);
+        for (u, v) in (0..2).flat_map(|u| (0..6).map(move |v| (u, v))) {
+            assert_eq!(across[u * 6 + v], down[v * 2 + u]);
         }
     }
 

@@ -1,36 +1,45 @@
-//! A square grey image, row-major.
+//! A grey image, row-major.
 
-use crate::Side;
+use crate::{Shape, Side, Size};
 
-/// An `n x n` image of reflectance in the measurement's own units (not scaled to `[0, 1]`),
-/// row-major.
+/// An image of reflectance in the measurement's own units (not scaled to `[0, 1]`), row-major: a
+/// square by default, or an `Image<Size>` of any height and width.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Image {
-    side: Side,
+pub struct Image<S = Side> {
+    shape: S,
     pixels: Vec<f32>,
 }
 
-impl Image {
+impl<S: Shape> Image<S> {
     /// Wraps row-major pixels.
     ///
     /// # Panics
-    /// If the length of `pixels` is not `side * side`.
+    /// If the length of `pixels` is not that of the shape.
     #[must_use]
-    pub fn new(side: Side, pixels: Vec<f32>) -> Self {
-        assert_eq!(pixels.len(), side.area(), "pixels of a {0} x {0} image", side.pixels());
-        Self { side, pixels }
+    pub fn new(shape: S, pixels: Vec<f32>) -> Self {
+        let size: Size = shape.into();
+        assert_eq!(pixels.len(), size.area(), "pixels of a {size} image");
+        Self { shape, pixels }
     }
 
-    /// Side of the image.
+    /// Height and width of the image.
     #[must_use]
-    pub fn side(&self) -> Side {
-        self.side
+    pub fn size(&self) -> Size {
+        self.shape.into()
     }
 
-    /// Row-major pixels: `side * side` values.
+    /// Row-major pixels: `height * width` values.
     #[must_use]
     pub fn pixels(&self) -> &[f32] {
         &self.pixels
+    }
+}
+
+impl Image {
+    /// Side of the image.
+    #[must_use]
+    pub fn side(&self) -> Side {
+        self.shape
     }
 
     /// The magnitude of a complex image, pixel by pixel.
@@ -39,8 +48,8 @@ impl Image {
     /// If the two parts differ in side: the caller made both from one measurement.
     #[must_use]
     pub fn magnitude(real: &Self, imaginary: &Self) -> Self {
-        assert_eq!(real.side, imaginary.side, "the parts of one image");
+        assert_eq!(real.shape, imaginary.shape, "the parts of one image");
         let parts = real.pixels.iter().zip(&imaginary.pixels);
-        Self { side: real.side, pixels: parts.map(|(re, im)| re.hypot(*im)).collect() }
+        Self { shape: real.shape, pixels: parts.map(|(re, im)| re.hypot(*im)).collect() }
     }
 }

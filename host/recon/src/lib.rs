@@ -36,6 +36,7 @@ mod repeats;
 mod rows;
 mod sampling;
 mod side;
+mod size;
 #[cfg(test)]
 mod testing;
 pub mod words;
@@ -52,3 +53,4 @@ pub use repeats::Repeats;
 pub use rows::{Rows, RowsError};
 pub use sampling::{Sampling, SamplingError};
 pub use side::{Side, SideError};
+pub use size::{Shape, Size, SizeError};

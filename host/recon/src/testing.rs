@@ -1,6 +1,6 @@
 //! Shared test support: scenes, simulated readings, real data.
 
-use crate::{Image, Measurements, Rows, Side, fwht};
+use crate::{Image, Measurements, Rows, Shape, Side, fwht};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::path::PathBuf;
@@ -129,9 +129,10 @@ pub(crate) fn normal(random: &mut Pcg64) -> f64 {
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-pub(crate) fn correlation_of(a: &Image, b: &Image) -> f64 {
-    let n = a.side().pixels();
-    crate::metrics::correlation(a.pixels(), b.pixels(), n, n).unwrap()
+pub(crate) fn correlation_of(a: &Image<impl Shape>, b: &Image<impl Shape>) -> f64 {
+    let size = a.size();
+    assert_eq!(b.size(), size);
+    crate::metrics::correlation(a.pixels(), b.pixels(), size.width(), size.height()).unwrap()
 }
 
 /// An open `.npz` file.

@@ -17,6 +17,7 @@ use crate::files::image::{Placed, encode_labelled, to_level};
 use crate::provenance::Provenance;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma, Rgb, RgbImage};
+use nirspi_recon::{Image, Shape};
 
 /// Edge of a panel's image, unless a panel needs more: a multiple of the sides 32, 64 and 128, so
 /// that their pixels stay square.
@@ -65,6 +66,13 @@ impl Panel {
             warnings: Vec::new(),
             field_mm: None,
         }
+    }
+
+    /// An image, stretched, without caption and warnings.
+    #[must_use]
+    pub fn of_image(title: &str, image: &Image<impl Shape>, unit: Unit) -> Self {
+        let (width, height) = (image.size().width(), image.size().height());
+        Self { width, height, ..Self::square(title, width, image.pixels(), unit) }
     }
 
     /// The values that are black and white in the picture.

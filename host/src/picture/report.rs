@@ -11,7 +11,7 @@ use super::video;
 use crate::files::FileError;
 use crate::files::output::{Existing, OutputDir, write_result};
 use crate::provenance::Provenance;
-use nirspi_recon::Image;
+use nirspi_recon::{Image, Shape};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -102,14 +102,13 @@ impl Pictures {
     /// `[0, 1]` with its warnings, if there is one.
     #[must_use]
     pub fn of_image(
-        image: &Image,
+        image: &Image<impl Shape>,
         unit: Unit,
         enhanced: Option<(&[f32], Vec<String>)>,
         provenance: &Provenance,
     ) -> Self {
         let mut pictures = Self::new(provenance);
-        let side = image.side().pixels();
-        let panel = Panel::square("reconstructed", side, image.pixels(), unit);
+        let panel = Panel::of_image("reconstructed", image, unit);
         pictures.single("image.png", panel);
         if let Some((values, warnings)) = enhanced {
             let panel = Panel::square("enhanced", values.len().isqrt(), values, Unit::OfWhite);

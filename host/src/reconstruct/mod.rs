@@ -4,6 +4,8 @@
 mod many;
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 mod one;
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+mod own;
 mod solver;
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 mod stack;
@@ -11,6 +13,8 @@ mod stack;
 pub use many::{FileImage, ManyImages, Skipped, file_images, many_images};
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 pub use one::{DropoutReport, OneError, OneImage, OneReport, one_image, write_image};
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+pub use own::{OwnError, OwnImage, OwnReport, own_image};
 pub use solver::{
     Recipe, Solved, Solver, SolverError, check_finite, not_read_words, own_atoms, read_atoms,
 };

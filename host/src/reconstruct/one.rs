@@ -11,7 +11,7 @@ use crate::provenance::Made;
 use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
 use nirspi_recon::words::count_of;
-use nirspi_recon::{Image, metrics};
+use nirspi_recon::{Image, Shape, metrics};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -210,17 +210,17 @@ pub fn one_image(
 /// [`FileError`] names the file. Nothing is left behind.
 pub fn write_image(
     out: &Path,
-    image: &Image,
+    image: &Image<impl Shape>,
     parts: Option<&[Image; 2]>,
     sharp: Option<&[f32]>,
     pictures: &Pictures,
     report: &impl Serialize,
 ) -> Result<(), FileError> {
-    let side = image.side().pixels();
+    let shape = [image.size().height(), image.size().width()];
     let mut out = OutputDir::create(out)?;
-    out.write("image.npy", &npy::encode(&[side, side], image.pixels()))?;
+    out.write("image.npy", &npy::encode(&shape, image.pixels()))?;
     for (name, part) in ["real.npy", "imaginary.npy"].iter().zip(parts.into_iter().flatten()) {
-        out.write(name, &npy::encode(&[side, side], part.pixels()))?;
+        out.write(name, &npy::encode(&shape, part.pixels()))?;
     }
     if let Some(sharp) = sharp {
         let side = nirspi_nets::deblur::SIDE;

@@ -7,7 +7,7 @@ use nirspi_recon::reconstruct::{
     Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction, stack,
 };
 use nirspi_recon::words::count_of;
-use nirspi_recon::{Image, MeasurementError, Measurements, Rows, Sampling, ShorterSweep};
+use nirspi_recon::{Image, MeasurementError, Measurements, Rows, Sampling, Shape, ShorterSweep};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -81,15 +81,15 @@ pub enum SolverError {
     /// The file of the user's own atoms cannot be read.
     #[error(transparent)]
     Atoms(#[from] FileError),
-    /// The atoms have another side than the measurements.
-    #[error("{}: images of {found:?}, expected {:?}", .path.display(), (side, side))]
-    AtomsSide {
+    /// The atoms have another size than the image.
+    #[error("{}: images of {found:?}, expected {expected:?}", .path.display())]
+    AtomsSize {
         /// The file of the atoms.
         path: PathBuf,
         /// Height and width of the atoms.
         found: (usize, usize),
-        /// Side of the measurements.
-        side: usize,
+        /// Height and width of the image.
+        expected: (usize, usize),
     },
     /// A pixel is infinite.
     #[error("{}: the readings are too large for an image of 32-bit floats", .0.display())]
@@ -121,7 +121,7 @@ impl Solver {
         let Recipe { method, settings, dictionary, .. } = &self.recipe;
         let mut settings = settings.clone();
         if let Some(path) = dictionary {
-            settings.dictionary = Some(own_atoms(path, read_atoms(path, side)?));
+            settings.dictionary = Some(own_atoms(path, read_atoms(path, (side, side))?));
         }
         let ready: Arc<dyn Reconstruct> = Arc::from(method.prepare(&settings)?);
         prepared.insert(side, Arc::clone(&ready));
@@ -217,7 +217,7 @@ impl Solver {
 ///
 /// # Errors
 /// [`SolverError::TooLarge`], which names the file.
-pub fn check_finite(path: &Path, image: &Image) -> Result<(), SolverError> {
+pub fn check_finite(path: &Path, image: &Image<impl Shape>) -> Result<(), SolverError> {
     match image.pixels().iter().all(|pixel| pixel.is_finite()) {
         true => Ok(()),
         false => Err(SolverError::TooLarge(path.to_owned())),
@@ -230,16 +230,16 @@ pub fn own_atoms(path: &Path, values: Vec<f32>) -> OwnAtoms {
     OwnAtoms { name: path.display().to_string(), values: values.into() }
 }
 
-/// A user's own images as atoms, which must have the measurements' side.
+/// A user's own images as atoms, of the height and width of the image.
 ///
 /// # Errors
-/// [`SolverError`] if the file cannot be read, or its images have another side.
-pub fn read_atoms(path: &Path, side: usize) -> Result<Vec<f32>, SolverError> {
+/// [`SolverError`] if the file cannot be read, or its images have another size.
+pub fn read_atoms(path: &Path, expected: (usize, usize)) -> Result<Vec<f32>, SolverError> {
     let atoms = npy::read_stack(path)?;
     let found = (atoms.height, atoms.width);
-    match found == (side, side) {
+    match found == expected {
         true => Ok(atoms.values),
-        false => Err(SolverError::AtomsSide { path: path.to_owned(), found, side }),
+        false => Err(SolverError::AtomsSize { path: path.to_owned(), found, expected }),
     }
 }
 

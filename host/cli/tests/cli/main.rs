@@ -24,6 +24,7 @@ mod many;
 mod metrics;
 mod options;
 mod other_forms;
+mod own_patterns;
 mod packaging;
 mod pairs;
 #[cfg(unix)]

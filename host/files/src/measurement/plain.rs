@@ -1,60 +1,135 @@
-//! Readings of patterns that the file does not name, for `--matrix`.
+//! Readings of patterns of a user's own, for `--matrix`.
 
-use super::opened::is_reading;
-use super::readings::{Expected, Hint, NamedReadings, check_infinite, readings_field};
+use super::axes::joined;
+use super::layout::Layout;
+use super::opened::{is_reading, read_simulated};
+use super::patterns::{PatternArray, PatternSelection, Patterns};
+use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings_field};
+use super::sides::{make_pairs, two_fields};
 use super::{FileError, Form, Selection};
 use crate::fields::Fields;
 use std::path::Path;
 
-/// Readings of patterns that the file does not name.
+/// Readings of patterns of a user's own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plain {
+    /// What the readings weigh the light with: all patterns, those that were not read included.
+    pub patterns: Patterns,
     /// The readings, all finite.
     pub values: Vec<f64>,
     /// The pattern of each reading.
-    pub patterns: Vec<usize>,
+    pub places: Vec<usize>,
     /// Patterns that were not read: the file has NaN, or an instrument's word for overload.
     pub not_read: Vec<usize>,
+    /// Whether the file says that no real light was measured; `None` if it does not say.
+    pub simulated: Option<bool>,
+    /// What people may not expect, one line each.
+    pub notes: Vec<String>,
 }
 
-/// Reads one number for each of `patterns` patterns, from `y` or else from `d`.
+/// Reads patterns from `matrix`, a file or a folder of pictures, and one number for each pattern
+/// from the file `readings`: a reading, from `y` or else from `d`, or the difference of pattern and
+/// complement.
 ///
 /// # Errors
 /// As [`super::read`].
-pub fn read_plain(path: &Path, want: &Selection, patterns: usize) -> Result<Plain, FileError> {
+pub fn read_plain(
+    matrix: &Path,
+    of_patterns: &PatternSelection,
+    readings: &Path,
+    want: &Selection,
+) -> Result<Plain, FileError> {
+    let array = PatternArray::open(matrix, of_patterns)?;
+    let arrangements = array.arrangements(of_patterns.size)?;
+    let mut refused = None;
+    for arrangement in arrangements {
+        match read_numbers(readings, want, arrangement.count) {
+            Ok(Numbers { all, form, simulated, mut notes }) => {
+                let (places, not_read): (Vec<usize>, Vec<usize>) =
+                    (0..all.len()).partition(|&k| is_reading(all[k]));
+                notes.extend(array.note(arrangement));
+                let patterns = array.patterns(arrangement);
+                let patterns = match form {
+                    Form::Single => patterns,
+                    _ => patterns.differences(),
+                };
+                let values = places.iter().map(|&k| all[k]).collect();
+                return Ok(Plain { patterns, values, places, not_read, simulated, notes });
+            }
+            Err(error) => refused = refused.or(Some(error)),
+        }
+    }
+    Err(refused.unwrap_or_else(|| FileError::kind(matrix, "no patterns", "patterns")))
+}
+
+/// A number for each pattern, NaN where none was read.
+struct Numbers {
+    all: Vec<f64>,
+    form: Form,
+    simulated: Option<bool>,
+    notes: Vec<String>,
+}
+
+fn read_numbers(path: &Path, want: &Selection, patterns: usize) -> Result<Numbers, FileError> {
     let mut fields = Fields::open(path, want.decimal_comma)?;
     let name = readings_field(&fields, want)?;
-    let hint = Hint { length: 2 * patterns, words: "; of +, - pairs give the differences" };
-    let expected = Expected {
-        form: Form::Single,
-        rows: vec![patterns as u64],
-        length: patterns,
-        meaning: "one reading a pattern",
-        hint,
+    let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
+    let paired = make_pairs(&mut fields, &name, want)?;
+    let is_paired = paired.is_some() || two_fields(&fields, &name).is_some();
+    notes.extend(paired);
+    let form = match want.form {
+        Some(form) => form,
+        None if is_paired => Form::Pairs,
+        None if name == "d" => Form::Differences,
+        None => form_of(&mut fields, &name, want, patterns)?,
     };
+    let mut expected = expected_of(form, patterns, vec![patterns as u64]);
+    if form == Form::Single {
+        expected.meaning = "one reading a pattern";
+        expected.hint = Hint {
+            length: 2 * patterns,
+            words: "; pairs of pattern and complement are read with --readings pairs or halves",
+        };
+    }
     let mut readings = NamedReadings::open(&mut fields, name, want, &expected)?;
     let layout = readings.layout;
     let numbers = readings.numbers(&mut fields)?;
+    let refused = |found, expected| FileError::field(path, readings.name.clone(), found, expected);
     if numbers.imaginary.is_some() {
-        return Err(FileError::field(
-            path,
-            readings.name,
-            "has complex numbers",
-            "real ones for patterns of one's own",
-        ));
+        return Err(refused("has complex numbers", "real ones for patterns of one's own"));
     }
     let index = layout.choose(path, &readings.name, want.index)?;
     let all = layout.series(&numbers.real, index);
     check_infinite(path, &readings.name, &all)?;
-    let (patterns, not_read): (Vec<usize>, Vec<usize>) =
-        (0..all.len()).partition(|&k| is_reading(all[k]));
-    if patterns.is_empty() {
-        return Err(FileError::field(
-            path,
-            readings.name,
-            "is NaN everywhere",
-            "a pattern that was read",
-        ));
+    let difference =
+        |pattern: f64, complement: f64| match is_reading(pattern) && is_reading(complement) {
+            true => pattern - complement,
+            false => f64::NAN,
+        };
+    let all: Vec<f64> = match form {
+        Form::Single | Form::Differences => all,
+        Form::Pairs => all.as_chunks().0.iter().map(|&[on, off]| difference(on, off)).collect(),
+        Form::Halves => (0..patterns).map(|k| difference(all[k], all[patterns + k])).collect(),
+    };
+    if !all.iter().copied().any(is_reading) {
+        return Err(refused("is NaN everywhere", "a pattern that was read"));
     }
-    Ok(Plain { values: patterns.iter().map(|&k| all[k]).collect(), patterns, not_read })
+    if form.readings() == 2 {
+        notes.push("the image is that of pattern minus complement".to_owned());
+    }
+    Ok(Numbers { all, form, simulated: read_simulated(&mut fields), notes })
+}
+
+/// Pairs if pattern and complement are on a last axis of two, else one reading a pattern.
+fn form_of(
+    fields: &mut Fields,
+    name: &str,
+    want: &Selection,
+    patterns: usize,
+) -> Result<Form, FileError> {
+    let (shape, _) = fields.open_field(name, |_| Ok(()))?;
+    let is_single = Layout::of(&shape, patterns, want.patterns_first).is_some();
+    let pairs = joined(&shape, Some(&[patterns as u64]), Form::Pairs);
+    let is_pairs = pairs != shape && Layout::of(&pairs, 2 * patterns, false).is_some();
+    Ok(if is_pairs && !is_single { Form::Pairs } else { Form::Single })
 }

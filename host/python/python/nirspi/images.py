@@ -114,12 +114,13 @@ class Image(np.ndarray):
             size = (values.shape[1], values.shape[0])
             facts = [self.facts()] if self.facts() else []
             return _nirspi.picture(values.reshape(-1), size, title, self.unit, facts, list(self.warnings))
+        if values.shape[-1] != values.shape[-2]:
+            raise _nirspi.Error(f"a stack of shape {self.shape}, expected square images: draw images[k]")
         return _nirspi.sheet(values.reshape(-1), values.shape[-1], title or self.facts(), self.unit)
 
     def _repr_png_(self) -> bytes | None:
-        if self.ndim < 2 or self.size == 0 or self.shape[-1] != self.shape[-2]:
-            return None
-        return self.png()
+        stack = self.ndim > 2 and self.shape[-1] != self.shape[-2]
+        return None if self.ndim < 2 or self.size == 0 or stack else self.png()
 
     def plot(self, ax: Any = None, **kwargs: Any) -> Any:
         """Draws one image with matplotlib: value under the cursor, colour bar, unit.

@@ -68,7 +68,7 @@ def reconstruct(
     warm_start: bool = False,
     matrix: Any = None,
     dark: bool = True,
-    n: int | None = None,
+    n: int | tuple[int, int] | None = None,
     device: str = "auto",
     **source: Any,
 ) -> Image:
@@ -107,12 +107,13 @@ def reconstruct(
         OMP: no negative light; needs the pixel basis or a dictionary.
     warm_start : bool
         Start each measurement from those before it; not for ``hadamard`` and ``pseudo-inverse``.
-    matrix : array_like, (M, n * n), optional
-        Patterns of your own instead of Hadamard rows.
+    matrix : array_like, (M, height, width) or (M, height * width), optional
+        Patterns of your own instead of Hadamard rows, a picture or a row each.
     dark : bool
         With ``matrix``: whether one constant, the reading without light, is fitted with the image.
-    n : int, optional
-        With ``matrix``: side of the image, if it is not the root of the matrix's columns.
+    n : int or (int, int), optional
+        With ``matrix``: side of the image, or its height and width, where patterns are rows and the
+        image is no square.
     device : str
         Where OMP computes: "auto", "cpu", or another name of :func:`devices`.
     **source
@@ -121,7 +122,7 @@ def reconstruct(
     Returns
     -------
     Image, (..., n, n) of float32
-        In the units of the readings. Of complex measurements, the magnitude.
+        With ``matrix``, of any height and width. In the units of the readings. Of complex measurements, the magnitude.
 
     Examples
     --------
@@ -176,7 +177,7 @@ def reconstruct(
     n = measurement.n
     options["noise"] = measurement.noise
     if dictionary is not None:
-        options["dictionary"] = _atoms(dictionary, n)
+        options["dictionary"] = _atoms(dictionary, (n, n))
     d = measurement.d
     leading = d.shape[:-1]
     if d.dtype.kind == "c":
@@ -258,30 +259,47 @@ def _while_reading(path: Any, source: dict[str, Any], options: dict[str, Any]) -
     return Image(pixels.reshape(count, n, n), report=_each(reports), rows=rows[0] if len(rows) == 1 else rows)
 
 
-def _atoms(dictionary: Any, n: int) -> np.ndarray:
+def _atoms(dictionary: Any, size: tuple[int, int]) -> np.ndarray:
     atoms = _arrays.real(dictionary, "dictionary")
-    if atoms.ndim != 3 or atoms.shape[1:] != (n, n):
-        raise Error(f"dictionary has shape {atoms.shape}, expected (N, {n}, {n})")
+    if atoms.ndim != 3 or atoms.shape[1:] != size:
+        raise Error(f"dictionary has shape {atoms.shape}, expected (N, {size[0]}, {size[1]})")
     return _arrays.flat(atoms, "dictionary", np.float32)
 
 
-def _by_matrix(readings: Any, matrix: Any, n: int | None, dictionary: Any, options: dict[str, Any]) -> Image:
+def _size(weights: np.ndarray, n: Any) -> tuple[int, int]:
+    """Height and width of the patterns in an array."""
+    found = f"matrix has shape {weights.shape}"
+    if weights.ndim not in (2, 3):
+        raise Error(f"{found}, expected (M, height, width) or (M, height * width)")
+    if n is not None:
+        asked = (n, n) if np.ndim(n) == 0 else tuple(n)
+        if len(asked) != 2:
+            raise Error(f"n is {n!r}, expected a side, or height and width")
+        height, width = (int(_arrays.count(side, "n", least=1) or 1) for side in asked)
+        if weights.shape[1:] not in [(height * width,), (height, width)]:
+            raise Error(f"{found}, expected (M, {height}, {width}) or (M, {height * width})")
+        return height, width
+    if weights.ndim == 3:
+        return weights.shape[1], weights.shape[2]
+    side = int(weights.shape[1] ** 0.5 + 0.5)
+    if side * side != weights.shape[1]:
+        raise Error(f"{found}, expected (M, {side * side}), or n=(height, width) of patterns that are no squares")
+    return side, side
+
+
+def _by_matrix(readings: Any, matrix: Any, n: Any, dictionary: Any, options: dict[str, Any]) -> Image:
     weights = _arrays.real(matrix, "matrix")
-    if weights.ndim != 2:
-        raise Error(f"matrix has shape {weights.shape}, expected (M, n * n)")
-    n = int(weights.shape[1] ** 0.5 + 0.5) if n is None else _arrays.side(n)
-    if n * n != weights.shape[1]:
-        raise Error(f"matrix has shape {weights.shape}, expected (M, {n * n})")
+    size = _size(weights, n)
     y = readings.d if isinstance(readings, Measurement) else _arrays.real(readings, "y")
     if y.ndim < 1 or y.shape[-1] != weights.shape[0]:
         raise Error(f"y has shape {y.shape}, expected (..., {weights.shape[0]}): one a pattern")
     if options["warm_start"] or options["order"] is not None:
         raise Error("warm_start and order belong to Hadamard rows, not to a matrix")
     if dictionary is not None:
-        options["dictionary"] = _atoms(dictionary, n)
+        options["dictionary"] = _atoms(dictionary, size)
     pixels, reports = _nirspi.reconstruct_matrix(
-        n, _arrays.flat(weights, "matrix", np.float64), _arrays.flat(y, "y", np.float64), options
+        size, _arrays.flat(weights, "matrix", np.float64), _arrays.flat(y, "y", np.float64), options
     )
     made = [json.loads(report) for report in reports]
     leading = y.shape[:-1]
-    return Image(pixels.reshape(*leading, n, n), report=made if leading else made[0])
+    return Image(pixels.reshape(*leading, *size), report=made if leading else made[0])

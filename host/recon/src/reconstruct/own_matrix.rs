@@ -37,86 +37,29 @@
 //! relative to the standard deviation.
 
 mod complete;
+mod error;
 mod problem;
 mod solvers;
 
 use super::Penalty;
-use crate::basis::Basis;
-use crate::omp::{OmpError, Stop};
-use crate::{Image, Side};
+use crate::basis::{Basis, Transform};
+use crate::omp::Stop;
+use crate::{Image, Shape, Size};
+pub use error::MatrixError;
 use nalgebra::{DMatrix, DVector};
 use problem::{Fit, Problem};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use thiserror::Error;
 
-/// A user's own patterns, one in each row, of `side * side` weights each.
+/// A user's own patterns, one in each row, of `height * width` weights each.
 #[derive(Debug, Clone)]
 pub struct OwnMatrix {
-    side: Side,
+    size: Size,
     patterns: DMatrix<f64>,
     rank: usize,
     /// Squared norm of each pattern, if all patterns are orthogonal to each other.
     orthogonal: Option<DVector<f64>>,
-}
-
-/// Why a matrix, its measurements or a setting is refused.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum MatrixError {
-    /// The weights are not a whole number of patterns.
-    #[error("{found} numbers, expected a multiple of the {area} pixels of a {n} x {n} image", n = area.isqrt())]
-    Shape {
-        /// Number of weights.
-        found: usize,
-        /// Number of pixels of an image.
-        area: usize,
-    },
-    /// A weight or measurement is NaN or infinite.
-    #[error("{field} is {found} at [{row}, {column}], expected finite numbers")]
-    NotFinite {
-        /// `matrix` or `y`.
-        field: &'static str,
-        /// Index of the pattern.
-        row: usize,
-        /// Index of the pixel.
-        column: usize,
-        /// The value found.
-        found: f64,
-    },
-    /// All weights of all patterns are 0.
-    #[error("a matrix of rank 0: every weight is 0, expected patterns that see something")]
-    Dark,
-    /// The number of measurements is not the number of patterns.
-    #[error("{found} measurements by {expected} patterns, expected one a pattern")]
-    Length {
-        /// Number of measurements.
-        found: usize,
-        /// Number of patterns.
-        expected: usize,
-    },
-    /// A setting out of range.
-    #[error("{setting} is {found}, expected {expected}")]
-    Setting {
-        /// The name of the setting.
-        setting: &'static str,
-        /// The value that was given.
-        found: f64,
-        /// The allowed values.
-        expected: &'static str,
-    },
-    /// Non-negative coefficients were requested for a basis whose atoms have negative pixels.
-    #[error(
-        "coefficients of 0 or more in the {basis} basis, expected the pixel basis or atoms of one's own"
-    )]
-    Signed {
-        /// The basis.
-        basis: Basis,
-    },
-    /// The pursuit refused the problem.
-    #[error(transparent)]
-    Pursuit(#[from] OmpError),
 }
 
 /// The method of inversion.
@@ -141,7 +84,7 @@ pub struct MatrixSettings {
     pub method: MatrixMethod,
     /// Basis of the coefficients.
     pub basis: Basis,
-    /// Images of the matrix's side, one after another, as atoms instead of a basis.
+    /// Images of the matrix's size, one after another, as atoms instead of a basis.
     pub atoms: Option<Vec<f32>>,
     /// Strength of a penalty, `t` in the module's table. By default, the strength that best
     /// predicts held-back measurements.
@@ -175,7 +118,7 @@ impl MatrixSettings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatrixReconstruction {
     /// The image, in the measurements' units divided by the patterns'.
-    pub image: Image,
+    pub image: Image<Size>,
     /// The method that made it: never [`MatrixMethod::Best`].
     pub method: MatrixMethod,
     /// Strength of the penalty; `None` for the pseudo-inverse.
@@ -262,10 +205,11 @@ impl OwnMatrix {
     ///
     /// # Errors
     /// [`MatrixError`] if the weights are not whole patterns, are not finite, or are all 0.
-    pub fn new(side: Side, weights: &[f64]) -> Result<Self, MatrixError> {
-        let area = side.area();
+    pub fn new(size: impl Shape, weights: &[f64]) -> Result<Self, MatrixError> {
+        let size: Size = size.into();
+        let area = size.area();
         if weights.is_empty() || !weights.len().is_multiple_of(area) {
-            return Err(MatrixError::Shape { found: weights.len(), area });
+            return Err(MatrixError::Shape { found: weights.len(), size });
         }
         finite("matrix", weights, area)?;
         let patterns = DMatrix::from_row_slice(weights.len() / area, area, weights);
@@ -277,13 +221,13 @@ impl OwnMatrix {
         if rank == 0 {
             return Err(MatrixError::Dark);
         }
-        Ok(Self { side, patterns, rank, orthogonal })
+        Ok(Self { size, patterns, rank, orthogonal })
     }
 
-    /// Side of the image.
+    /// Height and width of the image.
     #[must_use]
-    pub fn side(&self) -> Side {
-        self.side
+    pub fn size(&self) -> Size {
+        self.size
     }
 
     /// Number of patterns.
@@ -341,7 +285,7 @@ impl OwnMatrix {
                     Some(sparsity) => sparsity,
                     None => self.best_sparsity(y, settings, noise)?,
                 };
-                let problem = Problem::new(self, settings, y, &every);
+                let problem = Problem::new(self, settings, y, &every)?;
                 let mut found = problem.omp(noise, &[sparsity], settings.non_negative)?;
                 let (fit, size, stop) = found.remove(0);
                 (fit, Some(noise), Some((size, stop)))
@@ -360,7 +304,7 @@ impl OwnMatrix {
                         STRENGTHS[..=last_as_good(&errors)].to_vec()
                     }
                 };
-                let problem = Problem::new(self, settings, y, &every);
+                let problem = Problem::new(self, settings, y, &every)?;
                 let fit = problem.penalised(penalty, &strengths).swap_remove(strengths.len() - 1);
                 (fit, strengths.last().copied(), None)
             }
@@ -369,7 +313,7 @@ impl OwnMatrix {
         let y = DVector::from_column_slice(y).add_scalar(-dark.value());
         let left = (&y - &self.patterns * &pixels).norm();
         let residual = if y.norm() > 0.0 { left / y.norm() } else { 0.0 };
-        let image = Image::new(self.side, pixels.iter().map(|&v| v as f32).collect());
+        let image = Image::new(self.size, pixels.iter().map(|&v| v as f32).collect());
         let method = settings.method;
         Ok(MatrixReconstruction { image, method, strength, atoms, dark, residual })
     }
@@ -422,7 +366,7 @@ impl OwnMatrix {
         let dark = if unexplained.norm_squared() > UNEXPLAINED * y.len() as f64 {
             DarkLevel::Fitted(unexplained.dot(y) / unexplained.norm_squared())
         } else {
-            match solvers::smoothest(self.side, &pixels, &ghost) {
+            match solvers::smoothest(self.size, &pixels, &ghost) {
                 Some(level) => DarkLevel::Smoothest(level),
                 None => DarkLevel::Unknown,
             }
@@ -431,13 +375,16 @@ impl OwnMatrix {
     }
 
     fn check(&self, settings: &MatrixSettings) -> Result<(), MatrixError> {
-        let area = self.side.area();
+        let (size, area) = (self.size, self.size.area());
         if let Some(atoms) = &settings.atoms {
             if atoms.is_empty() || !atoms.len().is_multiple_of(area) {
-                return Err(MatrixError::Shape { found: atoms.len(), area });
+                return Err(MatrixError::Shape { found: atoms.len(), size });
             }
             let atoms: Vec<f64> = atoms.iter().map(|&v| v.into()).collect();
             finite("dictionary", &atoms, area)?;
+        }
+        if settings.atoms.is_none() {
+            self.transform(settings.basis)?;
         }
         if settings.non_negative && settings.atoms.is_none() && settings.basis != Basis::Pixel {
             return Err(MatrixError::Signed { basis: settings.basis });
@@ -449,6 +396,11 @@ impl OwnMatrix {
             }
             _ => Ok(()),
         }
+    }
+
+    fn transform(&self, basis: Basis) -> Result<Transform<Size>, MatrixError> {
+        let size = self.size;
+        Transform::of_size(basis, size).ok_or(MatrixError::Basis { basis, size })
     }
 
     fn errors_of_strengths(
@@ -496,7 +448,7 @@ impl OwnMatrix {
             if kept.is_empty() || held.is_empty() {
                 continue;
             }
-            let images = predict(&Problem::new(self, settings, y, &kept))?;
+            let images = predict(&Problem::new(self, settings, y, &kept)?)?;
             for (error, Fit { pixels, dark }) in errors.iter_mut().zip(images) {
                 let seen = |k: usize| self.patterns.row(k).transpose().dot(&pixels) + dark.value();
                 let miss = |&k: &usize| (y[k] - seen(k)).powi(2);

@@ -2,11 +2,12 @@
 
 use crate::{Law, MIB, place, read};
 use nirspi::files::measurement::{
-    self, MeasurementFile, Readings, Selection, Several, read_images_of, read_plain,
+    self, MeasurementFile, PatternSelection, Plain, Readings, Selection, Several, read_images_of,
+    read_plain,
 };
 use nirspi::files::table::Table;
 use nirspi::files::{FileError, npy, problem};
-use nirspi_recon::{Measurements, Order, Rows, Side};
+use nirspi_recon::{Measurements, Order, Rows, Side, Size};
 use std::io::{Cursor, Write};
 use std::path::Path;
 use zip::write::SimpleFileOptions;
@@ -123,12 +124,26 @@ fn files(bytes: &[u8]) {
     for want in selections() {
         one_file(&path, &want);
     }
-    if let Some(plain) = read(read_plain(&path, &Selection::default(), 3)) {
-        assert_eq!(plain.values.len(), plain.patterns.len());
-        assert_eq!(plain.patterns.len() + plain.not_read.len(), 3);
-        assert!(plain.values.iter().all(|value| value.is_finite()));
-    }
+    own_patterns(&path);
     read(read_images_of(&path));
+}
+
+/// The file as readings of three patterns, as the patterns of three readings, and as both.
+fn own_patterns(path: &Path) {
+    let three = place::file("three.npy", &npy::encode(&[3, 4], &[1.0_f32; 12]));
+    let readings = place::file("readings.npy", &npy::encode(&[3], &[1.0_f32; 3]));
+    let ways = [(&*three, path), (path, &*readings), (path, path)];
+    let forms = [None, Some(measurement::Form::Pairs)];
+    for ((matrix, input), form) in ways.into_iter().flat_map(|way| forms.map(|form| (way, form))) {
+        let of_patterns = PatternSelection { size: Size::new(2, 2).ok(), ..Default::default() };
+        let want = Selection { form, ..Selection::default() };
+        let Some(plain) = read(read_plain(matrix, &of_patterns, input, &want)) else { continue };
+        let Plain { patterns, values, places, not_read, .. } = plain;
+        assert_eq!((values.len(), patterns.weights.len()), (places.len(), 4 * patterns.count));
+        assert_eq!(places.len() + not_read.len(), patterns.count);
+        assert!(values.iter().chain(&patterns.weights).all(|number| number.is_finite()));
+        assert_eq!(patterns.select(&places).len(), 4 * places.len());
+    }
 }
 
 /// What is read is consistent, and the same by every way of reading, or refused in each.
@@ -324,11 +339,6 @@ fn arrays(bytes: &[u8]) {
         std::fs::write(&again, npy::encode(&[list.len()], &list)).expect("a file");
         let back = npy::read_list(&again).expect("our own file");
         assert!(list.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan()));
-    }
-    if let Some(matrix) = read(npy::read_matrix(&path)) {
-        assert_eq!(matrix.values.len(), matrix.rows * matrix.columns);
-        assert!(matrix.values.iter().all(|value| value.is_finite()));
-        assert_eq!(matrix.select(&[matrix.rows - 1]).len(), matrix.columns);
     }
 }
 

@@ -10,7 +10,7 @@
 
 use super::problem::Fit;
 use super::{DarkLevel, MatrixMethod, MatrixSettings, OwnMatrix, Penalty, STRENGTHS};
-use crate::basis::{Basis, Transform};
+use crate::basis::Basis;
 use nalgebra::DVector;
 
 /// Relative difference of norms that counts as rounding.
@@ -31,7 +31,7 @@ pub(super) fn solve(own: &OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Op
     if !is_ours {
         return None;
     }
-    let transform = Transform::new(settings.basis, own.side);
+    let transform = own.transform(settings.basis).ok()?;
     let coefficients = |y: &DVector<f64>| -> Vec<f64> {
         let seen = own.patterns.tr_mul(y) / energy;
         let mut image: Vec<f32> = seen.iter().map(|&v| v as f32).collect();
@@ -43,7 +43,7 @@ pub(super) fn solve(own: &OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Op
     let unit = unit / energy.sqrt();
     let found = coefficients(&(DVector::from_column_slice(y) / unit));
     let constant = coefficients(&DVector::from_element(y.len(), energy.sqrt()));
-    let frequencies = transform.basis().frequencies(own.side);
+    let frequencies = transform.basis().frequencies(own.size);
     let sizes: Vec<f64> = frequencies.iter().map(|f| f64::from(f.max(1.0)).powi(-2)).collect();
     // The mean has no penalty, and says nothing of the strength.
     let details: Vec<usize> = (0..sizes.len()).filter(|&j| frequencies[j] > 0.0).collect();
@@ -82,7 +82,7 @@ pub(super) fn is_complete(own: &OwnMatrix) -> bool {
 fn energy(own: &OwnMatrix) -> Option<f64> {
     let energies = own.orthogonal.as_ref()?;
     let (least, most) = (energies.min(), energies.max());
-    (energies.len() == own.side.area() && most - least <= SAME * most).then(|| energies.mean())
+    (energies.len() == own.size.area() && most - least <= SAME * most).then(|| energies.mean())
 }
 
 /// Coefficients with noise of the same size in each.

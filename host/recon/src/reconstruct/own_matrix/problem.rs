@@ -13,14 +13,14 @@
 
 use super::solvers::{self, Chosen};
 use super::{DarkLevel, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
-use crate::Side;
+use crate::Size;
 use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
 use nalgebra::{DMatrix, DVector};
 
 /// The measurements at some positions.
 pub(super) struct Problem {
-    side: Side,
+    size: Size,
     /// Patterns without the mean, with norm 1.
     patterns: DMatrix<f64>,
     /// Measurements without the mean, with variance 1.
@@ -36,7 +36,7 @@ pub(super) struct Problem {
 
 /// The atoms of the coefficients.
 enum Atoms {
-    Basis(Transform),
+    Basis(Transform<Size>),
     /// Images of norm 1, one in each column.
     Own(DMatrix<f64>),
 }
@@ -62,10 +62,15 @@ pub(super) struct Fit {
 const ROUNDING: f64 = 1e-12;
 
 impl Problem {
-    pub(super) fn new(own: &OwnMatrix, settings: &MatrixSettings, y: &[f64], at: &[usize]) -> Self {
+    pub(super) fn new(
+        own: &OwnMatrix,
+        settings: &MatrixSettings,
+        y: &[f64],
+        at: &[usize],
+    ) -> Result<Self, MatrixError> {
         let raw = own.patterns.select_rows(at);
         let raw_y = DVector::from_iterator(at.len(), at.iter().map(|&k| y[k]));
-        let area = own.side.area();
+        let area = own.size.area();
         let (mut patterns, mut values) = (raw.clone(), raw_y.clone());
         if settings.dark {
             let means = raw.row_mean();
@@ -103,7 +108,7 @@ impl Problem {
         let norm = solvers::norm(&patterns).max(f64::MIN_POSITIVE);
         patterns /= norm;
         let atoms = match &settings.atoms {
-            None => Atoms::Basis(Transform::new(settings.basis, own.side)),
+            None => Atoms::Basis(own.transform(settings.basis)?),
             Some(images) => {
                 let images: Vec<f64> = images.iter().map(|&v| v.into()).collect();
                 let mut images = DMatrix::from_column_slice(area, images.len() / area, &images);
@@ -113,8 +118,8 @@ impl Problem {
                 Atoms::Own(images)
             }
         };
-        Self {
-            side: own.side,
+        Ok(Self {
+            size: own.size,
             patterns,
             y: values,
             atoms,
@@ -123,7 +128,7 @@ impl Problem {
             raw_y,
             mean,
             fits_dark: settings.dark,
-        }
+        })
     }
 
     /// The image at each strength.
@@ -131,7 +136,7 @@ impl Problem {
         let found = match penalty {
             Penalty::TotalVariation => {
                 let images =
-                    solvers::total_variation(self.side, &self.patterns, &self.y, strengths);
+                    solvers::total_variation(self.size, &self.patterns, &self.y, strengths);
                 return images.into_iter().map(|x| self.image(x)).collect();
             }
             Penalty::Sparse => {
@@ -178,7 +183,7 @@ impl Problem {
                     transform.analyse(&mut image);
                     row.iter_mut().zip(&image).for_each(|(w, &c)| *w = c.into());
                 }
-                let frequencies = transform.basis().frequencies(self.side);
+                let frequencies = transform.basis().frequencies(self.size);
                 let scale = frequencies.iter().map(|f| 1.0 / f64::from(f.max(1.0)));
                 (seen, DVector::from_iterator(frequencies.len(), scale))
             }

@@ -3,7 +3,7 @@
 //! Each method solves a list of strengths, the strongest first. Each strength starts from the
 //! result of the one before.
 
-use crate::Side;
+use crate::Size;
 use crate::omp::{DenseDictionary, Limits, OmpError, Solver, Stop, nonnegative};
 use crate::reconstruct::regularised::total_variation::{climb, descend};
 use nalgebra::{DMatrix, DVector};
@@ -91,12 +91,13 @@ pub(super) fn least_squares(a: &DMatrix<f64>, y: &DVector<f64>) -> DVector<f64> 
 
 /// The factor by which `ghost` is subtracted from an image for the differences of neighbouring pixels to
 /// be least; `None` if the ghost is even.
-pub(super) fn smoothest(side: Side, image: &DVector<f64>, ghost: &DVector<f64>) -> Option<f64> {
-    let n = side.pixels();
+pub(super) fn smoothest(size: Size, image: &DVector<f64>, ghost: &DVector<f64>) -> Option<f64> {
+    let (width, area) = (size.width(), size.area());
     let (mut shared, mut own) = (0.0, 0.0);
-    for p in 0..side.area() {
-        for neighbour in [(p % n + 1 < n).then_some(p + 1), (p + n < side.area()).then_some(p + n)]
-        {
+    for p in 0..area {
+        let right = (p % width + 1 < width).then_some(p + 1);
+        let below = (p + width < area).then_some(p + width);
+        for neighbour in [right, below] {
             let Some(q) = neighbour else { continue };
             let step = ghost[q] - ghost[p];
             shared += step * (image[q] - image[p]);
@@ -180,13 +181,13 @@ pub(super) fn sparse(
 
 /// The primal-dual algorithm with a dual for the measurements and one for the gradient.
 pub(super) fn total_variation(
-    side: Side,
+    size: Size,
     a: &DMatrix<f64>,
     y: &DVector<f64>,
     strengths: &[f64],
 ) -> Vec<DVector<f64>> {
-    let n = side.pixels();
-    let mut x = DVector::<f64>::zeros(side.area());
+    let (width, area) = (size.width(), size.area());
+    let mut x = DVector::<f64>::zeros(area);
     // Steps are proportional to the contrast, and there is none: the image is dark or even.
     if y.norm() == 0.0 {
         return vec![x; strengths.len()];
@@ -194,10 +195,10 @@ pub(super) fn total_variation(
     // The gradient has norm sqrt 8. Divided by it, both parts have norm 1, and steps of 1 / sqrt 2
     // converge.
     let gradient = 8.0_f64.sqrt();
-    let contrast = y.norm() / (side.area() as f64).sqrt();
+    let contrast = y.norm() / (area as f64).sqrt();
     let (primal, dual) = (contrast / 2.0_f64.sqrt(), 1.0 / (contrast * 2.0_f64.sqrt()));
     let mut pull = DVector::<f64>::zeros(y.len());
-    let (mut down, mut across) = (vec![0.0_f32; side.area()], vec![0.0_f32; side.area()]);
+    let (mut down, mut across) = (vec![0.0_f32; area], vec![0.0_f32; area]);
     strengths
         .iter()
         .map(|strength| {
@@ -207,9 +208,9 @@ pub(super) fn total_variation(
                 pull = (&pull + (a * &ahead - y) * dual) / (1.0 + dual);
                 let seen: Vec<f32> = ahead.iter().map(|&v| v as f32).collect();
                 // Duals are stored in units of `radius`.
-                climb(n, &seen, (dual / gradient / radius) as f32, &mut down, &mut across);
-                let mut slope = vec![0.0_f32; side.area()];
-                descend(n, &down, &across, 1.0, &mut slope);
+                climb(width, &seen, (dual / gradient / radius) as f32, &mut down, &mut across);
+                let mut slope = vec![0.0_f32; area];
+                descend(width, &down, &across, 1.0, &mut slope);
                 let mut next = &x - a.tr_mul(&pull) * primal;
                 for (v, slope) in next.iter_mut().zip(&slope) {
                     *v += primal * radius / gradient * f64::from(*slope);

@@ -1,4 +1,7 @@
+mod shapes;
+
 use super::*;
+use crate::Side;
 use crate::reconstruct::hadamard;
 use crate::testing::{binary_patterns, correlation_of, measured, normal, scene, side};
 
@@ -139,7 +142,7 @@ fn the_likeliest_strength_keeps_what_is_clear_and_leaves_out_noise() {
     let weights = own.patterns.transpose();
     for kind in [1, 2] {
         let image = scene(side, kind);
-        let apart = |found: &Image| -> f64 {
+        let apart = |found: &Image<Size>| -> f64 {
             let each = found.pixels().iter().zip(&image).map(|(&a, b)| (f64::from(a) - b).powi(2));
             (each.sum::<f64>() / image.len() as f64).sqrt()
         };
@@ -411,7 +414,7 @@ fn a_mean_that_looks_like_a_dark_level_stays_in_the_image() {
     let side = side(8);
     let image = scene(side, 1);
     let mean = image.iter().sum::<f64>() / 64.0;
-    let mean_of = |image: &Image| image.pixels().iter().sum::<f32>() as f64 / 64.0;
+    let mean_of = |image: &Image<Size>| image.pixels().iter().sum::<f32>() as f64 / 64.0;
     // Half of the pixels of each pattern are lit.
     let mut random = Pcg64::seed_from_u64(2);
     let mut half: Vec<f64> = (0..64).map(|p| f64::from(u8::from(p % 2 == 0))).collect();
@@ -471,7 +474,7 @@ fn what_is_wrong_with_a_matrix_is_named() {
     let atoms = |count| MatrixSettings { atoms: Some(vec![1.0; count]), ..sound.clone() };
     for count in [0, 6] {
         let wrong = own.reconstruct(&[1.0, 1.0], &atoms(count)).unwrap_err();
-        assert_eq!(wrong, MatrixError::Shape { found: count, area: 4 });
+        assert_eq!(wrong, MatrixError::Shape { found: count, size: side.into() });
     }
     for found in [0.0, -1.0, 1.1e6] {
         let settings = MatrixSettings { strength: Some(found), ..sound.clone() };

@@ -1,0 +1,218 @@
+//! `nirspi reconstruct --matrix`: patterns of the user's own, in whatever form they come.
+
+use crate::bench::{Bench, Measured, correlation, npz, provenance};
+use nirspi::files::image::encode_grey;
+use nirspi::files::npy;
+
+/// Patterns of zeros and ones that no one has a name for, and what they measure of the phantom.
+fn own_patterns(measured: &Measured, patterns: usize) -> (Vec<f32>, Vec<f32>) {
+    let area = measured.n * measured.n;
+    let mut state = 1_u32;
+    let weights: Vec<f32> = (0..patterns * area)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 31) as f32
+        })
+        .collect();
+    let see = |p: &[f32]| p.iter().zip(&measured.image).map(|(w, v)| w * v).sum::<f32>();
+    let y = weights.chunks_exact(area).map(see).collect();
+    (weights, y)
+}
+
+#[test]
+fn patterns_of_the_users_own_are_inverted_by_every_method() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let (weights, y) = own_patterns(&measured, 150);
+    bench.write("phi.npy", &npy::encode(&[150, 256], &weights));
+    bench.write("in.npz", &npz(&[("y", &[150], &y)]));
+    let run = |more: &[&str]| {
+        bench.run(&[&["reconstruct", "in.npz", "--matrix", "phi.npy"], more].concat())
+    };
+    let mut least = 1.0;
+    for method in ["pseudo-inverse", "tikhonov", "fista", "tv", "omp"] {
+        run(&["--method", method]).succeeded();
+        let found = correlation(&bench.pixels("out/image.npy"), &measured.image);
+        if method == "pseudo-inverse" {
+            least = found;
+        } else {
+            assert!(found > least, "{method}: {found}, pseudo-inverse {least}");
+        }
+        let report = bench.json("out/report.json");
+        assert_eq!((&report["method"], &report["rank"]), (&method.into(), &150.into()));
+    }
+    run(&["--method", "tv", "--sampling", "0.25"]).succeeded();
+    assert_eq!(bench.json("out/report.json")["used"], 64);
+}
+
+#[test]
+fn what_is_wrong_with_patterns_of_the_users_own_is_named() {
+    let (bench, measured) = (Bench::new(), Measured::new(4));
+    let (mut weights, y) = own_patterns(&measured, 10);
+    let write = |name: &str, shape: &[usize], values: &[f32]| {
+        bench.write(name, &npy::encode(shape, values));
+    };
+    bench.write("in.npz", &npz(&[("y", &[10], &y)]));
+    let run = |matrix: &str, more: &[&str]| {
+        bench.run(&[&["reconstruct", "in.npz", "--matrix", matrix], more].concat())
+    };
+    write("nine.npy", &[9, 16], &weights[..144]);
+    run("nine.npy", &[])
+        .failed(1, &["in.npz", "`y` has shape (10,)", "(9,)", "one reading a pattern"]);
+    write("pairs.npy", &[5, 16], &weights[..80]);
+    run("pairs.npy", &[]).failed(1, &["are read with --readings pairs or halves"]);
+    write("odd.npy", &[10, 15], &weights[..150]);
+    run("odd.npy", &[]).failed(1, &["odd.npy", "has shape (10, 15)", "--size HEIGHTxWIDTH"]);
+    run("odd.npy", &["--size", "4x4"]).failed(1, &["has shape (10, 15)", "(M, 16) or (M, 4, 4)"]);
+    run("odd.npy", &["--size", "4"]).failed(2, &["4 pixels", "HEIGHTxWIDTH such as 12x15"]);
+    run("odd.npy", &["--size", "3x5", "--basis", "haar", "--method", "omp"])
+        .failed(1, &["odd.npy", "haar basis of 3 x 5 images", "expected dct or pixel"]);
+    write("flat.npy", &[160], &weights);
+    run("flat.npy", &[]).failed(1, &["flat.npy", "has shape (160,)", "(M, n * n)"]);
+    write("dark.npy", &[10, 16], &[0.0; 160]);
+    run("dark.npy", &[]).failed(1, &["dark.npy", "rank 0"]);
+    write("phi.npy", &[10, 16], &weights);
+    run("phi.npy", &["--method", "hadamard"]).failed(2, &["needs Hadamard rows", "pseudo-inverse"]);
+    run("phi.npy", &["--order", "zig-zag"]).failed(2, &["--matrix", "--order"]);
+    weights[35] = f32::NAN;
+    write("phi.npy", &[10, 16], &weights);
+    run("phi.npy", &[]).failed(1, &["phi.npy", "is NaN at [2, 3]"]);
+    assert!(!bench.names().contains(&"out".to_owned()));
+    // Twice the same pattern is no mistake.
+    weights.copy_within(16..32, 32);
+    write("phi.npy", &[10, 16], &weights);
+    let said = run("phi.npy", &["--method", "pseudo-inverse"]).succeeded();
+    assert!(said.stdout.contains("rank 9") && said.stdout.contains("1 of 10 patterns"), "{said:?}");
+    // Patterns as pictures are the same patterns.
+    let image = std::fs::read(bench.path("out/image.npy")).unwrap();
+    write("phi.npy", &[10, 4, 4], &weights);
+    run("phi.npy", &["--method", "pseudo-inverse", "--out", "again"]).succeeded();
+    assert_eq!(std::fs::read(bench.path("again/image.npy")).unwrap(), image);
+    // Pictures have rows and columns of their own.
+    run("phi.npy", &["--transpose"]).failed(1, &["has shape (10, 4, 4)", "patterns as rows"]);
+    std::fs::create_dir(bench.path("empty")).unwrap();
+    run("empty", &[]).failed(1, &["empty", "a folder without pictures", "a pattern each"]);
+}
+
+/// Random patterns of 0 and 1, and what they see of a scene that no symmetry maps onto itself.
+fn of_size(height: usize, width: usize, patterns: usize) -> (Vec<f32>, Vec<f32>, Vec<f32>) {
+    let scene: Vec<f32> = (0..height * width)
+        .map(|p| (p / width, p % width))
+        .map(|(r, c)| match () {
+            () if (2..height / 2).contains(&r) && (1..2 * width / 3).contains(&c) => 1.0,
+            () if r > 3 * height / 4 && c > width / 2 => 0.6,
+            () => 0.1,
+        })
+        .collect();
+    let mut state = 1_u32;
+    let weights: Vec<f32> = (0..patterns * height * width)
+        .map(|_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 31) as f32
+        })
+        .collect();
+    let see = |p: &[f32]| p.iter().zip(&scene).map(|(w, v)| w * v).sum::<f32>();
+    let y = weights.chunks_exact(height * width).map(see).collect();
+    (scene, weights, y)
+}
+
+#[test]
+fn patterns_come_in_any_size_and_form() {
+    let bench = Bench::new();
+    let (count, height, width) = (160, 12, 15);
+    let area = height * width;
+    let (scene, weights, y) = of_size(height, width, count);
+    let down: Vec<f32> =
+        (0..count * area).map(|at| weights[at % count * area + at / count]).collect();
+    let by_columns: Vec<f32> = weights
+        .chunks_exact(area)
+        .flat_map(|p| (0..area).map(move |at| p[at % height * width + at / height]))
+        .collect();
+    bench.write("y.npy", &npy::encode(&[count], &y));
+    bench.write("rows.npy", &npy::encode(&[count, area], &weights));
+    bench.write("pictures.npy", &npy::encode(&[count, height, width], &weights));
+    bench.write("columns.npy", &npy::encode(&[area, count], &down));
+    bench.write("last.npy", &npy::encode(&[height, width, count], &down));
+    bench.write("matlab.npy", &npy::encode(&[count, area], &by_columns));
+    let both = npz(&[("y", &[count], &y), ("patterns", &[count, area], &weights)]);
+    bench.write("both.npz", &both);
+    bench.write("named.npz", &npz(&[("y", &[count], &y), ("phi", &[count, area], &weights)]));
+    std::fs::create_dir(bench.path("folder")).unwrap();
+    for (k, pattern) in weights.chunks_exact(area).enumerate() {
+        let picture = encode_grey(width, height, pattern, &provenance());
+        bench.write(&format!("folder/pattern {k}.png"), &picture);
+    }
+    let size = ["--size", "12x15"];
+    let cases: [(&str, &str, &[&str], &str); 9] = [
+        ("y.npy", "rows.npy", &size, ""),
+        ("y.npy", "pictures.npy", &[], ""),
+        ("y.npy", "pictures.npy", &size, ""),
+        ("y.npy", "columns.npy", &size, "along the last axis of columns.npy"),
+        ("y.npy", "last.npy", &[], "along the last axis of last.npy"),
+        ("y.npy", "matlab.npy", &["--size", "12x15", "--transpose"], ""),
+        ("both.npz", "both.npz", &size, ""),
+        ("named.npz", "named.npz", &["--size", "12x15", "--matrix-field", "phi"], ""),
+        ("y.npy", "folder", &[], ""),
+    ];
+    let mut image = None;
+    for (input, matrix, more, note) in cases {
+        let line = ["reconstruct", input, "--matrix", matrix, "--method", "tikhonov"];
+        let said = bench.run(&[&line, more].concat()).succeeded();
+        assert!(said.stdout.contains(": 12 x 15, 160 of 160 patterns"), "{said:?}");
+        assert_eq!(said.stdout.contains("along the last axis"), !note.is_empty(), "{said:?}");
+        assert!(said.stdout.contains(note), "{said:?}");
+        let report = bench.json("out/report.json");
+        assert_eq!((&report["height"], &report["width"]), (&12.into(), &15.into()));
+        let found = bench.pixels("out/image.npy");
+        let alike = correlation(&found, &scene);
+        assert!(alike > 0.9, "{matrix}: {alike}");
+        assert_eq!(image.get_or_insert_with(|| found.clone()), &found, "{matrix}");
+        std::fs::remove_dir_all(bench.path("out")).unwrap();
+    }
+    // Squares need no size, whatever their side.
+    let (scene, weights, y) = of_size(10, 10, 90);
+    bench.write("y.npy", &npy::encode(&[90], &y));
+    bench.write("rows.npy", &npy::encode(&[90, 100], &weights));
+    bench.run(&["reconstruct", "y.npy", "--matrix", "rows.npy"]).succeeded();
+    assert!(correlation(&bench.pixels("out/image.npy"), &scene) > 0.9);
+}
+
+/// The complement of a pattern lights what the pattern leaves dark.
+#[test]
+fn pattern_and_complement_give_differences() {
+    let bench = Bench::new();
+    let (scene, weights, y) = of_size(12, 15, 170);
+    let all: f32 = scene.iter().sum();
+    let other: Vec<f32> = y.iter().map(|y| all - y).collect();
+    // Ambient light that drifts, which a difference does not see.
+    let dark = |k: usize| 40.0 + k as f32;
+    let lifted = |y: &[f32]| y.iter().enumerate().map(|(k, y)| y + dark(k)).collect::<Vec<f32>>();
+    let (on, off) = (lifted(&y), lifted(&other));
+    let pairs: Vec<f32> = on.iter().zip(&off).flat_map(|(a, b)| [*a, *b]).collect();
+    let differences: Vec<f32> = on.iter().zip(&off).map(|(a, b)| a - b).collect();
+    bench.write("phi.npy", &npy::encode(&[170, 12, 15], &weights));
+    bench.write("side.npy", &npy::encode(&[170, 2], &pairs));
+    bench.write("turns.npy", &npy::encode(&[340], &pairs));
+    bench.write("halves.npy", &npy::encode(&[340], &[&on[..], &off].concat()));
+    bench.write("two.npz", &npz(&[("on", &[170], &on), ("off", &[170], &off)]));
+    bench.write("d.npz", &npz(&[("d", &[170], &differences)]));
+    let cases: [(&str, &[&str]); 5] = [
+        ("side.npy", &[]),
+        ("turns.npy", &["--readings", "pairs"]),
+        ("halves.npy", &["--readings", "halves"]),
+        ("two.npz", &["--field", "on,off"]),
+        ("d.npz", &[]),
+    ];
+    for (input, more) in cases {
+        let line = ["reconstruct", input, "--matrix", "phi.npy", "--method", "tikhonov"];
+        let said = bench.run(&[&line, more].concat()).succeeded();
+        let found = bench.pixels("out/image.npy");
+        let apart = found.iter().zip(&scene).map(|(a, b)| (a - b).abs()).sum::<f32>() / 180.0;
+        // In the units of the scene: the weights are 1 and -1.
+        assert!(apart < 0.05, "{input}: {apart}");
+        let says = said.stdout.contains("the image is that of pattern minus complement");
+        assert_eq!(says, input != "d.npz", "{said:?}");
+        std::fs::remove_dir_all(bench.path("out")).unwrap();
+    }
+    bench.write("nan.npy", &npy::encode(&[170, 2], &[f32::NAN; 340]));
+    bench.run(&["reconstruct", "nan.npy", "--matrix", "phi.npy"]).failed(1, &["is NaN everywhere"]);
+}
