@@ -38,6 +38,8 @@
 
 mod complete;
 mod error;
+mod folds;
+mod gram;
 mod problem;
 mod solvers;
 
@@ -46,11 +48,13 @@ use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
 use crate::{Image, Shape, Size};
 pub use error::MatrixError;
+use folds::Folds;
 use nalgebra::{DMatrix, DVector};
 use problem::{Fit, Problem};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use rayon::prelude::*;
 
 /// A user's own patterns, one in each row, of `height * width` weights each.
 #[derive(Debug, Clone)]
@@ -193,6 +197,12 @@ const SPARSITIES: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 200, 300];
 /// linearly independent.
 const NEW: f64 = 1e-11;
 
+/// The same in single precision, for which a pattern is independent without a closer look.
+const SURELY_NEW: f64 = 1e-4;
+
+/// Number of patterns from which a first look in single precision saves time.
+const MANY: usize = 512;
+
 /// Relative difference of sums of weights that counts as rounding.
 const SAME_SUM: f64 = 1e-9;
 
@@ -289,6 +299,12 @@ impl OwnMatrix {
                 let mut found = problem.omp(noise, &[sparsity], settings.non_negative)?;
                 let (fit, size, stop) = found.remove(0);
                 (fit, Some(noise), Some((size, stop)))
+            }
+            MatrixMethod::Best | MatrixMethod::Penalty(Penalty::Tikhonov)
+                if let Some(folds) = Folds::new(self, y, settings) =>
+            {
+                let (fit, strength) = folds.chosen();
+                (fit, Some(strength), None)
             }
             MatrixMethod::Best | MatrixMethod::Penalty(_) => {
                 let penalty = match settings.method {
@@ -410,6 +426,11 @@ impl OwnMatrix {
         penalty: Penalty,
     ) -> Result<Vec<f64>, MatrixError> {
         let predict = |problem: &Problem| Ok(problem.penalised(penalty, &STRENGTHS));
+        if penalty == Penalty::Tikhonov
+            && let Some(folds) = Folds::new(self, y, settings)
+        {
+            return Ok(folds.errors());
+        }
         self.errors(y, settings, STRENGTHS.len(), predict)
     }
 
@@ -436,18 +457,8 @@ impl OwnMatrix {
         count: usize,
         predict: impl Fn(&Problem) -> Result<Vec<Fit>, MatrixError>,
     ) -> Result<Vec<f64>, MatrixError> {
-        let mut shuffled: Vec<usize> = (0..y.len()).collect();
-        shuffled.shuffle(&mut Pcg64::seed_from_u64(SPLIT_SEED));
         let mut errors = vec![0.0; count];
-        for fold in 0..FOLDS {
-            let of = |held: bool| -> Vec<usize> {
-                let part = shuffled.iter().enumerate();
-                part.filter(|(i, _)| (i % FOLDS == fold) == held).map(|(_, &k)| k).collect()
-            };
-            let (kept, held) = (of(false), of(true));
-            if kept.is_empty() || held.is_empty() {
-                continue;
-            }
+        for (kept, held) in folds(y.len()) {
             let images = predict(&Problem::new(self, settings, y, &kept)?)?;
             for (error, Fit { pixels, dark }) in errors.iter_mut().zip(images) {
                 let seen = |k: usize| self.patterns.row(k).transpose().dot(&pixels) + dark.value();
@@ -457,6 +468,21 @@ impl OwnMatrix {
         }
         Ok(errors)
     }
+}
+
+/// The measurements that are kept and those that are held back, for each fold with both.
+fn folds(count: usize) -> impl Iterator<Item = (Vec<usize>, Vec<usize>)> {
+    let mut shuffled: Vec<usize> = (0..count).collect();
+    shuffled.shuffle(&mut Pcg64::seed_from_u64(SPLIT_SEED));
+    (0..FOLDS)
+        .map(move |fold| {
+            let of = |held: bool| -> Vec<usize> {
+                let part = shuffled.iter().enumerate();
+                part.filter(|(i, _)| (i % FOLDS == fold) == held).map(|(_, &k)| k).collect()
+            };
+            (of(false), of(true))
+        })
+        .filter(|(kept, held)| !kept.is_empty() && !held.is_empty())
 }
 
 fn as_good_as_the_best(errors: &[f64]) -> impl Fn(&f64) -> bool {
@@ -479,6 +505,15 @@ fn finite(field: &'static str, values: &[f64], width: usize) -> Result<(), Matri
     }
 }
 
+/// Squared norm of each pattern.
+fn energies(patterns: &DMatrix<f64>) -> DVector<f64> {
+    let mut energies = DVector::zeros(patterns.nrows());
+    for column in patterns.column_iter() {
+        energies.zip_apply(&column, |energy: &mut f64, weight| *energy += weight * weight);
+    }
+    energies
+}
+
 /// Squared norms of the patterns, if all patterns are orthogonal to each other. `A A^T v` is
 /// compared with `D v` for a few random `v`: non-orthogonal patterns would have to pass every
 /// comparison by chance.
@@ -489,10 +524,7 @@ fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
     if rows > columns {
         return None;
     }
-    let mut energies = DVector::<f64>::zeros(rows);
-    for column in patterns.column_iter() {
-        energies.zip_apply(&column, |energy, weight| *energy += weight * weight);
-    }
+    let energies = energies(patterns);
     if energies.iter().any(|&energy| energy == 0.0) {
         return None;
     }
@@ -510,6 +542,17 @@ fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
     holds.then_some(energies)
 }
 
+/// An image made of each pattern, in a column.
+fn images(patterns: &DMatrix<f64>, make: impl Fn(&mut [f64]) -> Vec<f32> + Sync) -> DMatrix<f32> {
+    let (count, area) = patterns.shape();
+    let mut images = DMatrix::<f32>::zeros(area, count);
+    images.as_mut_slice().par_chunks_exact_mut(area).enumerate().for_each(|(k, image)| {
+        let mut weights: Vec<f64> = patterns.row(k).iter().copied().collect();
+        image.copy_from_slice(&make(&mut weights));
+    });
+    images
+}
+
 /// The rank by pivoted Cholesky factorisation of the smaller Gram matrix, as far as the
 /// factorisation goes.
 fn rank(patterns: &DMatrix<f64>) -> usize {
@@ -517,6 +560,11 @@ fn rank(patterns: &DMatrix<f64>) -> usize {
     let largest = patterns.amax();
     if largest == 0.0 {
         return 0;
+    }
+    let relative = |pattern: &mut [f64]| pattern.iter().map(|w| (w / largest) as f32).collect();
+    let is_wide = (MANY..=patterns.ncols()).contains(&patterns.nrows());
+    if is_wide && gram::are_independent(gram::gram(&images(patterns, relative)), SURELY_NEW) {
+        return patterns.nrows();
     }
     let patterns = &(patterns / largest);
     let mut gram = match patterns.nrows() <= patterns.ncols() {

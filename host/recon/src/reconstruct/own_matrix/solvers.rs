@@ -9,13 +9,13 @@ use crate::reconstruct::regularised::total_variation::{climb, descend};
 use nalgebra::{DMatrix, DVector};
 
 /// The most iterations of iterative methods.
-const ITERATIONS: usize = 300;
+pub(super) const ITERATIONS: usize = 300;
 
 /// Smallest singular value, relative to the largest, that is told from rounding.
 const SEEN: f64 = 1e-7;
 
 /// Relative change at which an iteration has settled.
-const SETTLED: f64 = 1e-5;
+pub(super) const SETTLED: f64 = 1e-5;
 
 /// Largest singular value, by power iteration, with an error towards too large.
 pub(super) fn norm(a: &DMatrix<f64>) -> f64 {

@@ -1,3 +1,4 @@
+mod folds;
 mod shapes;
 
 use super::*;

@@ -1,0 +1,357 @@
+//! Tikhonov's images of few patterns of many pixels, for all strengths and all folds at once.
+//!
+//! With `K = A S^2 A^T`, Tikhonov's problem of the measurements `f` is `(P K P + t) z = P y`: `P`
+//! leaves out the other measurements and removes what has no penalty, the dark level and the mean.
+//! The image is `S^2 A^T P z`, and its measurements are `K P z`. So all folds share one matrix, and no
+//! image is needed to judge a strength. Conjugate gradients for the weakest strength solve the others
+//! on the way, because all have the same residuals but for a factor (B. Jegerlehner,
+//! arXiv:hep-lat/9612014), and one pass through `K` serves all folds.
+
+use super::gram::gram;
+use super::problem::Fit;
+use super::solvers::{ITERATIONS, SETTLED};
+use super::{DarkLevel, MatrixSettings, OwnMatrix, STRENGTHS, energies, images, last_as_good};
+use crate::Size;
+use crate::basis::{Basis, Transform};
+use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+/// Part of the patterns' norm below which what is left of them is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Tikhonov's images of all measurements and of the folds, not yet made.
+pub(super) struct Folds<'o> {
+    own: &'o OwnMatrix,
+    transform: Transform<Size>,
+    /// Squares of the expected sizes; 0 for the mean, which has no penalty.
+    sizes: Vec<f32>,
+    /// `K`.
+    products: DMatrix<f64>,
+    /// Sum of the weights of each pattern.
+    sums: DVector<f64>,
+    /// Squared norm of each pattern.
+    energies: DVector<f64>,
+    y: DVector<f64>,
+    strengths: Vec<f64>,
+    /// All measurements, then those of each fold.
+    parts: Vec<Part>,
+}
+
+/// Some of the measurements.
+struct Part {
+    /// 1 for a measurement that is used, 0 for one that is held back.
+    used: DVector<f64>,
+    /// Orthonormal directions without a penalty.
+    free: Vec<DVector<f64>>,
+    mean: Mean,
+    fits_dark: bool,
+    /// `P z` for each strength, in units in which `K P z` are the measurements.
+    found: Vec<DVector<f64>>,
+}
+
+/// How the mean of the image is found.
+enum Mean {
+    /// No pattern sees it.
+    Unseen,
+    /// By least squares: the measurements of an even image of 1.
+    Fitted(DVector<f64>),
+    /// It looks like a dark level: all patterns see it with this weight.
+    Shared(f64),
+}
+
+/// What is added to the measurements of an image without a mean.
+struct Level {
+    mean: f64,
+    dark: DarkLevel,
+}
+
+impl<'o> Folds<'o> {
+    /// `None` for atoms of one's own or single pixels, and for more patterns than pixels, whose
+    /// number is reduced instead.
+    pub(super) fn new(own: &'o OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Option<Self> {
+        let is_ours = settings.atoms.is_none()
+            && settings.basis != Basis::Pixel
+            && own.patterns() <= own.size.area();
+        let transform = Transform::of_size(settings.basis, own.size).filter(|_| is_ours)?;
+        let frequencies = settings.basis.frequencies(own.size);
+        let sizes: Vec<f32> =
+            frequencies.iter().map(|&f| if f > 0.0 { f.max(1.0).powi(-2) } else { 0.0 }).collect();
+        let largest = own.patterns.amax();
+        let products = gram(&images(&own.patterns, |image| {
+            image.iter_mut().for_each(|weight| *weight /= largest);
+            let mut values: Vec<f32> = image.iter().map(|&weight| weight as f32).collect();
+            transform.analyse(&mut values);
+            values.iter_mut().zip(&sizes).for_each(|(value, size)| *value *= size.sqrt());
+            values
+        })) * (largest * largest);
+        let mut folds = Self {
+            own,
+            transform,
+            sizes,
+            products,
+            sums: own.patterns.column_sum(),
+            energies: energies(&own.patterns),
+            y: DVector::from_column_slice(y),
+            strengths: settings
+                .strength
+                .map_or_else(|| STRENGTHS.to_vec(), |strength| vec![strength]),
+            parts: Vec::new(),
+        };
+        let every: Vec<usize> = (0..y.len()).collect();
+        let mut parts = vec![folds.part(&every, settings.dark)];
+        if settings.strength.is_none() {
+            parts.extend(super::folds(y.len()).map(|(kept, _)| folds.part(&kept, settings.dark)));
+        }
+        folds.solve(&mut parts);
+        folds.parts = parts;
+        Some(folds)
+    }
+
+    /// The image of all measurements at the strength that predicts those held back best, or at the
+    /// one that was given; and the strength.
+    pub(super) fn chosen(&self) -> (Fit, f64) {
+        self.fit(last_as_good(&self.errors()))
+    }
+
+    /// Errors of each strength on the held-back measurements: sums of squares.
+    pub(super) fn errors(&self) -> Vec<f64> {
+        let strengths = 0..self.strengths.len();
+        strengths
+            .map(|strength| self.parts[1..].iter().map(|part| self.missed(part, strength)).sum())
+            .collect()
+    }
+
+    /// The image of all measurements at the strength of this index, and the strength.
+    fn fit(&self, strength: usize) -> (Fit, f64) {
+        let whole = &self.parts[0];
+        let level = self.level(whole, &(&self.products * &whole.found[strength]));
+        let weights: DVector<f64> = self.own.patterns.tr_mul(&whole.found[strength]);
+        let unit = weights.amax().max(f64::MIN_POSITIVE);
+        let mut image: Vec<f32> = weights.iter().map(|&weight| (weight / unit) as f32).collect();
+        self.transform.analyse(&mut image);
+        image.iter_mut().zip(&self.sizes).for_each(|(value, size)| *value *= size);
+        self.transform.synthesise(&mut image);
+        let pixels = image.iter().map(|&value| f64::from(value) * unit + level.mean);
+        let pixels = DVector::from_iterator(image.len(), pixels);
+        (Fit { pixels, dark: level.dark }, self.strengths[strength])
+    }
+
+    fn part(&self, kept: &[usize], fits_dark: bool) -> Part {
+        let mut used = DVector::zeros(self.y.len());
+        kept.iter().for_each(|&k| used[k] = 1.0);
+        let shown = kept.len() as f64;
+        let seen = self.energies.dot(&used);
+        let rounding = ROUNDING * seen.sqrt();
+        let sums = self.sums.component_mul(&used);
+        let mut free = Vec::new();
+        let mut even = sums.clone();
+        if fits_dark {
+            even -= &used * (sums.sum() / shown);
+            free.push(&used / shown.sqrt());
+        }
+        let mean = match () {
+            () if even.norm() > rounding => {
+                free.push(&even / even.norm());
+                Mean::Fitted(even)
+            }
+            () if fits_dark && sums.norm() > rounding => Mean::Shared(sums.sum() / shown),
+            () => Mean::Unseen,
+        };
+        Part { used, free, mean, fits_dark, found: Vec::new() }
+    }
+
+    /// Solves all parts for all strengths.
+    fn solve(&self, parts: &mut [Part]) {
+        let mut runs: Vec<Run> = parts.iter().map(|part| self.run(part)).collect();
+        for _ in 0..ITERATIONS {
+            let directions: Vec<&DVector<f64>> = runs.iter().map(|run| &run.direction).collect();
+            if runs.iter().all(Run::has_settled) {
+                break;
+            }
+            let seen = product(&self.products, &directions);
+            for ((run, part), seen) in runs.iter_mut().zip(&*parts).zip(seen) {
+                if !run.has_settled() {
+                    run.advance(part.projected(seen) * run.scale, &self.strengths);
+                }
+            }
+        }
+        for (part, run) in parts.iter_mut().zip(runs) {
+            part.found = run.found.into_iter().map(|z| z * run.unit).collect();
+        }
+    }
+
+    /// The start of a part: measurements of variance 1, and expected energy that is the measured one.
+    fn run(&self, part: &Part) -> Run {
+        let y = part.projected(self.y.component_mul(&part.used));
+        let shown = part.used.sum();
+        let free: f64 = part.free.iter().map(|free| free.dot(&(&self.products * free))).sum();
+        let energy = self.products.diagonal().dot(&part.used) - free;
+        let largest = self.products.diagonal().max();
+        // What rounding leaves of equal numbers is no contrast.
+        let is_flat = y.norm() <= ROUNDING * self.y.component_mul(&part.used).norm()
+            || energy <= 1e-7 * shown * largest;
+        let spread = y.norm() / shown.sqrt();
+        let (scale, y) = match is_flat {
+            true => (0.0, y * 0.0),
+            false => (shown / energy, y / spread),
+        };
+        Run::new(y, scale, spread * scale, self.strengths.len())
+    }
+
+    /// Mean and dark level that fit the measurements of a part best; `seen` are those of its image
+    /// without a mean.
+    fn level(&self, part: &Part, seen: &DVector<f64>) -> Level {
+        let left = (&self.y - seen).component_mul(&part.used);
+        let offset = left.sum() / part.used.sum();
+        match &part.mean {
+            Mean::Unseen if part.fits_dark => Level { mean: 0.0, dark: DarkLevel::Fitted(offset) },
+            Mean::Unseen => Level { mean: 0.0, dark: DarkLevel::LeftOut },
+            Mean::Shared(weight) => Level { mean: offset / weight, dark: DarkLevel::Unknown },
+            Mean::Fitted(even) => {
+                let mean = even.dot(&left) / even.norm_squared();
+                let left = left - self.sums.component_mul(&part.used) * mean;
+                let dark = match part.fits_dark {
+                    true => DarkLevel::Fitted(left.sum() / part.used.sum()),
+                    false => DarkLevel::LeftOut,
+                };
+                Level { mean, dark }
+            }
+        }
+    }
+
+    /// Squared error of a part's image on the measurements that were held back from it.
+    fn missed(&self, part: &Part, strength: usize) -> f64 {
+        let seen = &self.products * &part.found[strength];
+        let level = self.level(part, &seen);
+        let held = (0..self.y.len()).filter(|&k| part.used[k] == 0.0);
+        held.map(|k| (self.y[k] - seen[k] - self.sums[k] * level.mean - level.dark.value()).powi(2))
+            .sum()
+    }
+}
+
+impl Part {
+    /// `P v`.
+    fn projected(&self, mut v: DVector<f64>) -> DVector<f64> {
+        v.component_mul_assign(&self.used);
+        for free in &self.free {
+            let along = free.dot(&v);
+            v.axpy(-along, free, 1.0);
+        }
+        v
+    }
+}
+
+/// The products of a symmetric matrix with some vectors, in one pass.
+fn product(matrix: &DMatrix<f64>, vectors: &[&DVector<f64>]) -> Vec<DVector<f64>> {
+    let size = matrix.nrows();
+    let vectors: Vec<&[f64]> = vectors.iter().map(|vector| vector.as_slice()).collect();
+    let dots = |row| Arch::new().dispatch(Dots { row, vectors: &vectors });
+    let rows: Vec<Vec<f64>> = matrix.as_slice().par_chunks_exact(size).map(dots).collect();
+    let of = |at: usize| DVector::from_iterator(size, rows.iter().map(|row| row[at]));
+    (0..vectors.len()).map(of).collect()
+}
+
+/// The inner products of a row with some vectors, as a type, because `pulp` compiles a type's method
+/// for each vector width.
+struct Dots<'a> {
+    row: &'a [f64],
+    vectors: &'a [&'a [f64]],
+}
+
+impl WithSimd for Dots<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
+        self.vectors.iter().map(|vector| dot(self.row, vector)).collect()
+    }
+}
+
+/// Sums side by side, because the order of one sum would allow no vectors.
+#[inline(always)]
+fn dot(row: &[f64], vector: &[f64]) -> f64 {
+    let mut sums = [0.0; 32];
+    let ((rows, last), (vectors, end)) = (row.as_chunks::<32>(), vector.as_chunks::<32>());
+    for (row, vector) in rows.iter().zip(vectors) {
+        for ((sum, a), b) in sums.iter_mut().zip(row).zip(vector) {
+            *sum += a * b;
+        }
+    }
+    let rest: f64 = last.iter().zip(end).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+/// Conjugate gradients for the weakest strength, which is the last, and for the others with it.
+struct Run {
+    /// By which `K` is multiplied.
+    scale: f64,
+    /// By which a solution is multiplied to belong to the measurements.
+    unit: f64,
+    residual: DVector<f64>,
+    direction: DVector<f64>,
+    energy: f64,
+    first_energy: f64,
+    step: f64,
+    turn: f64,
+    found: Vec<DVector<f64>>,
+    directions: Vec<DVector<f64>>,
+    /// Residual of each strength as a part of the weakest one's, now and one step ago.
+    parts: Vec<[f64; 2]>,
+}
+
+impl Run {
+    fn new(y: DVector<f64>, scale: f64, unit: f64, strengths: usize) -> Self {
+        let energy = y.norm_squared();
+        Self {
+            scale,
+            unit,
+            found: vec![y.clone() * 0.0; strengths],
+            directions: vec![y.clone(); strengths],
+            parts: vec![[1.0; 2]; strengths],
+            residual: y.clone(),
+            direction: y,
+            energy,
+            first_energy: energy,
+            step: 1.0,
+            turn: 0.0,
+        }
+    }
+
+    fn has_settled(&self) -> bool {
+        self.energy <= SETTLED.powi(2) * self.first_energy
+    }
+
+    /// One step along the direction, of which `seen` is the product with the matrix.
+    fn advance(&mut self, seen: DVector<f64>, strengths: &[f64]) {
+        let weakest = strengths[strengths.len() - 1];
+        let seen = seen + &self.direction * weakest;
+        let step = self.energy / self.direction.dot(&seen);
+        let next: Vec<f64> = strengths
+            .iter()
+            .zip(&self.parts)
+            .map(|(strength, &[now, before])| {
+                let stronger = before * self.step * (1.0 + (strength - weakest) * step);
+                now * before * self.step / (step * self.turn * (before - now) + stronger)
+            })
+            .collect();
+        self.residual.axpy(-step, &seen, 1.0);
+        let energy = self.residual.norm_squared();
+        let turn = energy / self.energy;
+        for (k, next) in next.into_iter().enumerate() {
+            let now = self.parts[k][0];
+            // The residual of a strong penalty is far below that of the weakest, and its image is found.
+            if now.abs() < f64::EPSILON {
+                continue;
+            }
+            let ratio = next / now;
+            self.found[k].axpy(step * ratio, &self.directions[k], 1.0);
+            self.directions[k] *= turn * ratio * ratio;
+            self.directions[k].axpy(next, &self.residual, 1.0);
+            self.parts[k] = [next, now];
+        }
+        self.direction *= turn;
+        self.direction += &self.residual;
+        (self.step, self.turn, self.energy) = (step, turn, energy);
+    }
+}
