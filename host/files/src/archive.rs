@@ -149,6 +149,21 @@ impl Archive {
         Ok(shape)
     }
 
+    /// The shape of a field of any size, and what `take` makes of its numbers, a block of them at a time; the numbers are not
+    /// read without it. `accept` is that of [`numbers`](Self::numbers).
+    pub(super) fn each_block(
+        &mut self,
+        field: &str,
+        accept: impl FnOnce(&[u64]) -> Result<(), String>,
+        take: Option<&mut dyn FnMut(&[f64])>,
+    ) -> Result<Vec<usize>, FileError> {
+        let (shape, ()) = self.member(field, accept, |header, member| match take {
+            Some(take) => header.each_block(member, u64::MAX, take),
+            None => header.data_bytes(u64::MAX).map(|_| ()),
+        })?;
+        Ok(shape)
+    }
+
     /// A field whose real numbers lie in the file as they are; `None` for any other field.
     pub(super) fn stored(&mut self, field: &str) -> Result<Option<Stored>, FileError> {
         let path = self.path.clone();

@@ -175,6 +175,22 @@ pub(super) fn read_field(path: &Path) -> Result<Field, FileError> {
     Ok(Field { shape, real, imaginary })
 }
 
+/// The shape of a `.npy` file of any shape that `fits`, and what `take` makes of its numbers, a block of them at a time; the
+/// numbers are not read without it.
+pub(super) fn each_block(
+    path: &Path,
+    expected: &'static str,
+    fits: impl Fn(&[u64]) -> bool,
+    shapes: &str,
+    take: Option<&mut dyn FnMut(&[f64])>,
+) -> Result<Vec<u64>, FileError> {
+    let decode = |header: &Header, stream: &mut BufReader<File>, limit| match take {
+        Some(take) => header.each_block(stream, limit, take),
+        None => header.data_bytes(limit).map(|_| ()),
+    };
+    Ok(read_array(path, expected, fits, shapes, decode)?.0.shape().to_vec())
+}
+
 /// Reads the header and the numbers of a `.npy` file whose shape fits.
 fn read_numbers<T: Sample>(
     path: &Path,
@@ -192,7 +208,7 @@ fn read_array<D>(
     expected: &'static str,
     fits: impl Fn(&[u64]) -> bool,
     shapes: &str,
-    decode: impl Fn(&Header, &mut BufReader<File>, u64) -> Result<D, ArrayError>,
+    decode: impl FnOnce(&Header, &mut BufReader<File>, u64) -> Result<D, ArrayError>,
 ) -> Result<(Header, D), FileError> {
     let (file, file_bytes) = open_file(path, expected)?;
     let mut stream = BufReader::new(file);

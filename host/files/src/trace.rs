@@ -4,19 +4,28 @@
 //! # Invariant
 //! Each reading is the mean of the samples of one pattern and of no other one. A pattern whose
 //! trigger is missing has NaN for a reading, and those behind it keep their places
-//! (`windows::tests::lost_and_extra_edges_are_named_and_move_no_other_reading`).
+//! (`tests::lost_and_extra_edges_are_named_and_move_no_other_reading`).
 
+mod series;
+mod sums;
 mod windows;
+mod words;
 
 use super::FileError;
-use super::field::EXPECTED;
-use super::fields::{Fields, UNNAMED};
-use super::plain::{MAX_MEMORY_BYTES, open_file};
-use std::io::Read;
+use super::fields::UNNAMED;
+use series::{Series, Shape};
+use std::ops::Range;
 use std::path::Path;
-pub use windows::{Cut, Found, TraceError};
+use sums::Sums;
+use windows::{Edges, Windows};
 
-/// Numbers without a header.
+/// The most readings of a trace: 16 000 sweeps of 32 x 32 patterns and their complements.
+const MAX_READINGS: usize = 1 << 25;
+
+/// Readings that [`Found::first`] shows.
+const FIRST: usize = 8;
+
+/// Numbers without a heading, little-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Raw {
     /// 32-bit floats.
@@ -33,7 +42,7 @@ impl Raw {
 
     /// The word for the kind.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::F32 => "f32",
             Self::F64 => "f64",
@@ -41,163 +50,253 @@ impl Raw {
         }
     }
 
-    fn bytes(self) -> usize {
+    /// The kind in a few words.
+    #[must_use]
+    pub fn about(self) -> &'static str {
         match self {
-            Self::F32 => 4,
-            Self::F64 => 8,
-            Self::I16 => 2,
-        }
-    }
-
-    fn number(self, bytes: &[u8]) -> f64 {
-        match (self, bytes) {
-            (Self::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
-            (Self::I16, &[a, b]) => f64::from(i16::from_le_bytes([a, b])),
-            (Self::F64, &[a, b, c, d, e, f, g, h]) => f64::from_le_bytes([a, b, c, d, e, f, g, h]),
-            _ => f64::NAN,
+            Self::F32 => "32-bit floats",
+            Self::F64 => "64-bit floats",
+            Self::I16 => "signed 16-bit integers",
         }
     }
 }
 
-/// A detector's samples, and those of the trigger.
+impl std::str::FromStr for Raw {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let known = Self::ALL.into_iter().find(|raw| raw.name() == word);
+        known.ok_or_else(|| "expected f32, f64 or i16".to_owned())
+    }
+}
+
+/// Which samples of a file make readings.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Cut {
+    /// The field with the detector's samples; not needed where the file has no other one.
+    pub field: Option<String>,
+    /// The field with the trigger's samples, as many: a pattern begins where it rises through the middle of its range.
+    pub trigger: Option<String>,
+    /// Samples of a pattern. With a trigger, its edges must show this number.
+    pub samples: Option<usize>,
+    /// Samples to skip before the first pattern.
+    pub skip: usize,
+    /// Samples at the beginning of each pattern that its reading leaves out, while the light settles.
+    pub settle: usize,
+    /// Readings to keep. Without a number, all are kept.
+    pub count: Option<usize>,
+    /// The kind of the numbers of a file without a heading.
+    pub raw: Option<Raw>,
+    /// Whether every comma of a text file is a decimal comma.
+    pub decimal_comma: bool,
+}
+
+/// The readings of a trace, and what was found on the way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trace {
-    /// The detector's samples, in the order of time.
-    pub samples: Vec<f64>,
-    /// The trigger's samples, as many.
-    pub trigger: Option<Vec<f64>>,
-    /// What the file has beside its numbers and was left out, in one line.
-    pub note: Option<String>,
+pub struct Found {
+    /// The mean of each pattern's samples; NaN for a pattern without any.
+    pub readings: Vec<f64>,
+    /// Samples of a pattern: the middle one of all intervals.
+    pub samples: usize,
+    /// Samples of the trace.
+    pub length: usize,
+    /// Samples before the first pattern, and after the last reading.
+    pub outside: (usize, usize),
+    /// Whether a trigger said where patterns begin.
+    pub by_trigger: bool,
+    /// Readings that are not there: the trigger has no edge, or too few samples follow the edge.
+    pub lost: Vec<usize>,
+    /// Samples at which the trigger rises too early to begin a pattern. They are left out.
+    pub extra: Vec<usize>,
+    /// Readings that are not there because a sample is an instrument's word for overload.
+    pub overloads: Vec<usize>,
+    /// Samples after the last edge, if the trace ends before the pattern does.
+    pub cut_off: Option<usize>,
+    /// What a text has beside its table and was left out, in one line.
+    pub skipped: Option<String>,
+    /// The first readings.
+    pub first: First,
 }
 
-impl Trace {
-    /// Reads the samples in the field `field` of a file of any format that
-    /// [`measurement::read`](crate::measurement::read) knows, and the trigger in another field. A
-    /// file of one array needs no name.
-    ///
-    /// # Errors
-    /// [`FileError`], one line that names file, field, what was found and what was expected.
-    pub fn read(
-        path: &Path,
-        field: Option<&str>,
-        trigger: Option<&str>,
-    ) -> Result<Self, FileError> {
-        let mut fields = Fields::open(path, false)?;
-        let list = fields.names().join(", ");
-        let name = match (field, fields.names()) {
-            (Some(field), _) => field.to_owned(),
-            (None, []) => UNNAMED.to_owned(),
-            (None, [only]) => only.clone(),
-            (None, names) => {
-                let rest = names.iter().filter(|name| Some(name.as_str()) != trigger);
-                match rest.collect::<Vec<_>>()[..] {
-                    [only] => only.clone(),
-                    _ => {
-                        let expected = format!("--field with one of {list}");
-                        let found = "has several fields";
-                        return Err(FileError::field(path, "--field", found, expected));
-                    }
-                }
-            }
-        };
-        if fields.is_unnamed() && (field.is_some() || trigger.is_some()) {
-            let expected = "no names of fields: a file with one array has none";
-            return Err(FileError::field(path, UNNAMED, "is the only array", expected));
-        }
-        let mut series = |name: &str| {
-            if !fields.is_unnamed() && !fields.holds(name) {
-                let expected = format!("one of {list}");
-                return Err(FileError::field(path, name, "is not in the file", expected));
-            }
-            fields.read_real(name, |shape| {
-                match shape.iter().filter(|&&axis| axis != 1).count() <= 1 && !shape.contains(&0) {
-                    true => Ok(()),
-                    false => Err("(N,) samples".to_owned()),
-                }
-            })
-        };
-        let samples = series(&name)?;
-        let trigger = trigger.map(|trigger| Ok((trigger, series(trigger)?))).transpose()?;
-        if let Some((name, trigger)) = &trigger
-            && trigger.len() != samples.len()
-        {
-            let found = format!("has {} samples", trigger.len());
-            return Err(FileError::field(path, *name, found, format!("{}", samples.len())));
-        }
-        let note = fields.skipped().map(str::to_owned);
-        Ok(Self { samples, trigger: trigger.map(|(_, trigger)| trigger), note })
-    }
+/// The beginning of a trace, for a picture.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct First {
+    /// Places and values of samples: all of them, or evenly chosen ones.
+    pub samples: Vec<(usize, f64)>,
+    /// The samples of each of the first readings; an empty range for a reading that is not there.
+    pub windows: Vec<Range<usize>>,
+    /// Where the trigger rises at the beginning of a pattern.
+    pub edges: Vec<usize>,
+    /// Where the trigger rises too early.
+    pub extra: Vec<usize>,
+}
 
-    /// Reads samples without a header, little-endian.
-    ///
-    /// # Errors
-    /// [`FileError`] for a file that is empty, too large, or no whole number of samples.
-    pub fn read_raw(path: &Path, raw: Raw) -> Result<Self, FileError> {
-        let (file, length) = open_file(path, EXPECTED)?;
-        let most = MAX_MEMORY_BYTES / size_of::<f64>() as u64 * raw.bytes() as u64;
-        let each = raw.bytes() as u64;
-        if length == 0 || length > most || !length.is_multiple_of(each) {
-            let found = format!("{length} bytes");
-            let expected = match raw {
-                Raw::F32 => "32-bit floats, at most 256 MiB",
-                Raw::F64 => "64-bit floats, at most 512 MiB",
-                Raw::I16 => "16-bit numbers, at most 128 MiB",
-            };
-            return Err(FileError::kind(path, found, expected));
+/// Makes readings of the trace in a file: of any format that [`measurement::read`](crate::measurement::read) knows but
+/// recordings, or numbers without a heading.
+///
+/// # Errors
+/// [`FileError`], one line that names file, field, what was found and what was expected.
+pub fn read(path: &Path, cut: &Cut) -> Result<Found, FileError> {
+    let mut series = Series::open(path, cut.raw, cut.decimal_comma)?;
+    let (field, trigger) = fields(path, &series, cut)?;
+    let last = cut.samples.filter(|&k| k > 1 && cut.skip == 0 && trigger.is_none());
+    let shape = Shape { last };
+    let shown = if series.is_unnamed() { UNNAMED } else { &field };
+    let refuse = |of: &str, found: String, expected: String| {
+        Err(FileError::field(path, of, found, expected))
+    };
+    let claimed = series.count(&field, shape)?;
+    let Ok(length) = usize::try_from(claimed) else {
+        return refuse(shown, format!("has {claimed} samples"), "fewer".to_owned());
+    };
+    let (windows, extra, cut_off) = match &trigger {
+        Some(name) => {
+            let found = by_trigger(path, &mut series, name, length, cut)?;
+            (found.windows, found.extra, found.cut_off)
         }
-        let mut bytes = Vec::new();
-        file.take(length)
-            .read_to_end(&mut bytes)
-            .map_err(|error| FileError::io(path, "read", error))?;
-        let samples = bytes.chunks_exact(raw.bytes()).map(|bytes| raw.number(bytes)).collect();
-        Ok(Self { samples, trigger: None, note: None })
+        None => {
+            let Some(samples) = cut.samples.filter(|&samples| samples > 0) else {
+                let expected = "a trigger, or 1 sample or more of each pattern".to_owned();
+                return refuse(shown, "cannot be cut".to_owned(), expected);
+            };
+            let left = length.saturating_sub(cut.skip);
+            if left < samples {
+                let found = format!("has {left} samples after the {} skipped", cut.skip);
+                return refuse(shown, found, format!("{samples} or more: those of a pattern"));
+            }
+            (Windows::every(samples, cut.skip, cut.settle, length), Vec::new(), None)
+        }
+    };
+    let samples = windows.samples;
+    if cut.settle >= samples {
+        let found = format!("has {samples} samples of a pattern");
+        return refuse(shown, found, format!("more than the {} to settle", cut.settle));
+    }
+    let found = match &windows.edges() {
+        [] => (length - cut.skip) / samples,
+        _ => windows.iter().count(),
+    };
+    let count = cut.count.unwrap_or(found);
+    if found < count || count == 0 {
+        return refuse(shown, format!("has {found} readings"), format!("{count}"));
+    }
+    if count > MAX_READINGS {
+        let expected = format!("at most {MAX_READINGS}");
+        return refuse(shown, format!("has {found} readings"), expected);
+    }
+    let mut sums = Sums::new(windows.iter().take(count), First::range(&windows, count));
+    series.each_block(&field, shape, &mut |block| sums.take(block))?;
+    let sums = sums.finished();
+    if let Some((at, value)) = sums.wrong {
+        return refuse(shown, format!("is {value} at [{at}]"), "finite numbers".to_owned());
+    }
+    let empty = windows.iter().take(count).enumerate().filter(|(_, window)| window.is_empty());
+    let lost = empty.map(|(k, _)| k).collect();
+    let is_first = |edge: &&usize| sums.shown.contains(edge);
+    let first = First {
+        samples: sums.first,
+        windows: windows.iter().take(FIRST.min(count)).collect(),
+        edges: windows.edges().iter().filter(is_first).copied().collect(),
+        extra: extra.iter().filter(is_first).copied().collect(),
+    };
+    Ok(Found {
+        readings: sums.readings,
+        samples,
+        length,
+        outside: (windows.first(), length.saturating_sub(sums.end)),
+        by_trigger: trigger.is_some(),
+        lost,
+        extra,
+        overloads: sums.overloads,
+        cut_off: cut_off.filter(|_| cut.count.is_none()),
+        skipped: series.skipped().map(str::to_owned),
+        first,
+    })
+}
+
+impl First {
+    /// The samples to show: the first readings, and as much before them as two patterns have.
+    fn range(windows: &Windows, count: usize) -> Range<usize> {
+        let shown = windows.iter().take(FIRST.min(count));
+        let end = shown.map(|window| window.end).max().unwrap_or(0);
+        let start = windows.first().saturating_sub(2 * windows.samples);
+        start..end.saturating_add(windows.samples / 2).max(start)
+    }
+}
+
+/// The names of the fields of the samples and of the trigger.
+fn fields(path: &Path, series: &Series, cut: &Cut) -> Result<(String, Option<String>), FileError> {
+    let list = series.names().join(", ");
+    if series.is_unnamed() {
+        return match cut.field.is_some() || cut.trigger.is_some() {
+            true => {
+                let expected = "no names of fields: a file with one array has none";
+                Err(FileError::field(path, UNNAMED, "is the only array", expected))
+            }
+            false => Ok((UNNAMED.to_owned(), None)),
+        };
+    }
+    for name in cut.field.iter().chain(&cut.trigger) {
+        if !series.names().contains(name) {
+            let expected = format!("one of {list}");
+            return Err(FileError::field(path, name, "is not in the file", expected));
+        }
+    }
+    let mut rest = series.names().iter().filter(|name| Some(*name) != cut.trigger.as_ref());
+    match (&cut.field, rest.next(), rest.next()) {
+        (Some(field), ..) | (None, Some(field), None) => Ok((field.clone(), cut.trigger.clone())),
+        _ => {
+            let expected = format!("--field with one of {list}");
+            Err(FileError::field(path, "--field", "is needed for several fields", expected))
+        }
+    }
+}
+
+fn by_trigger(
+    path: &Path,
+    series: &mut Series,
+    name: &str,
+    length: usize,
+    cut: &Cut,
+) -> Result<windows::Cut, FileError> {
+    let refuse = |found: String, expected: &str| Err(FileError::field(path, name, found, expected));
+    let shape = Shape { last: None };
+    let count = series.count(name, shape)?;
+    if count != length as u64 {
+        return refuse(format!("has {count} samples"), &format!("{length}, as the readings have"));
+    }
+    let (mut at, mut wrong) = (0, None);
+    let mut range = (f64::INFINITY, f64::NEG_INFINITY);
+    series.each_block(name, shape, &mut |block| {
+        let skipped = cut.skip.saturating_sub(at).min(block.len());
+        for (k, &level) in block.iter().enumerate().skip(skipped) {
+            range = (range.0.min(level), range.1.max(level));
+            if !level.is_finite() && wrong.is_none() {
+                wrong = Some((at + k, level));
+            }
+        }
+        at += block.len();
+    })?;
+    if let Some((at, level)) = wrong {
+        return refuse(format!("is {level} at [{at}]"), "finite numbers");
+    }
+    let mut edges = Edges::new(range, cut.skip, MAX_READINGS);
+    series.each_block(name, shape, &mut |block| edges.take(block))?;
+    let found = edges.count();
+    if found > MAX_READINGS {
+        return refuse(format!("rises more than {MAX_READINGS} times"), "fewer edges");
+    }
+    let Some(found) = edges.cut(cut.settle) else {
+        let times = if found == 1 { "once" } else { "nowhere" };
+        return refuse(format!("rises {times}"), "two edges or more: one for each pattern");
+    };
+    match (cut.samples, found.windows.samples) {
+        (Some(asked), samples) if asked != samples => {
+            refuse(format!("rises every {samples} samples"), &format!("{asked}"))
+        }
+        _ => Ok(found),
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::{file, line, npy_f64};
-
-    #[test]
-    fn samples_and_trigger_are_fields_of_any_file() {
-        let rows = (0..9).map(|at| format!("{at},{},{}\n", at * 2, at % 3)).collect::<String>();
-        let (_guard, path) = file("scope.csv", format!("time,CH1,TRIG\n{rows}").as_bytes());
-        let trace = Trace::read(&path, Some("CH1"), Some("TRIG")).unwrap();
-        assert_eq!((trace.samples[8], trace.trigger.unwrap()[5]), (16.0, 2.0));
-        let told =
-            |field, trigger| line(&Trace::read(&path, field, trigger).unwrap_err(), "scope.csv");
-        assert!(told(None, Some("TRIG")).contains("expected --field with one of time, CH1, TRIG"));
-        assert!(told(Some("CH1"), Some("T")).contains("`T` is not in the file, expected one of"));
-        let (_guard, path) = file("one.npy", &npy_f64("(4, 1)", &[1.0, 2.0, 3.0, 4.0]));
-        assert_eq!(Trace::read(&path, None, None).unwrap().samples, [1.0, 2.0, 3.0, 4.0]);
-        let told = line(&Trace::read(&path, Some("y"), None).unwrap_err(), "one.npy");
-        assert!(told.contains("no names of fields"), "{told}");
-        let (_guard, path) = file("two.npy", &npy_f64("(2, 2)", &[1.0, 2.0, 3.0, 4.0]));
-        let told = line(&Trace::read(&path, None, None).unwrap_err(), "two.npy");
-        assert!(told.contains("has shape (2, 2), expected (N,) samples"), "{told}");
-    }
-
-    #[test]
-    fn numbers_without_a_header_are_read_by_their_kind() {
-        let numbers = [1.5, -2.0, 300.0];
-        let bytes = |raw: Raw| -> Vec<u8> {
-            let each = numbers.iter().map(|&v| match raw {
-                Raw::F32 => (v as f32).to_le_bytes().to_vec(),
-                Raw::F64 => f64::to_le_bytes(v).to_vec(),
-                Raw::I16 => (v as i16).to_le_bytes().to_vec(),
-            });
-            each.flatten().collect()
-        };
-        for raw in Raw::ALL {
-            let (_guard, path) = file("sample.dat", &bytes(raw));
-            let found = Trace::read_raw(&path, raw).unwrap().samples;
-            assert_eq!(found, numbers.map(|v| if raw == Raw::I16 { v.trunc() } else { v }));
-            let (_guard, path) = file("cut.dat", &bytes(raw)[1..]);
-            let told = line(&Trace::read_raw(&path, raw).unwrap_err(), "cut.dat");
-            assert!(told.contains("bytes, expected "), "{told}");
-        }
-        let (_guard, path) = file("empty.dat", b"");
-        assert!(Trace::read_raw(&path, Raw::F64).is_err());
-    }
-}
+mod tests;

@@ -35,3 +35,18 @@ pub fn encode(
     members.extend(simulated.map(|s| ("simulated", npy::encode(&[], &[i64::from(s)]))));
     archive::encode(path, &members)
 }
+
+/// The bytes of a `.npz` file with readings of patterns that the file does not name: `y`, and the provenance as JSON text.
+///
+/// # Errors
+/// [`FileError`] naming `path`, if the archive cannot be written.
+pub fn encode_readings(
+    path: &Path,
+    readings: Vec<f64>,
+    provenance: &Provenance,
+) -> Result<Vec<u8>, FileError> {
+    let y = npy::encode(&[readings.len()], &readings);
+    // Millions of readings are not in memory twice.
+    drop(readings);
+    archive::encode(path, &[("y", y), (PROVENANCE, npy::encode_text(&provenance.json()))])
+}

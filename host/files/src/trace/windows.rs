@@ -1,300 +1,190 @@
-//! Cuts a trace into the samples of each pattern.
+//! Which samples make each reading.
 
-use super::Trace;
 use std::ops::Range;
-use thiserror::Error;
 
 /// Part of the usual interval below which an edge belongs to no pattern.
 const EXTRA: f64 = 0.5;
 
-/// Part of its samples that the last pattern needs.
+/// Part of the usual interval that the first and the last pattern need.
 const WHOLE: f64 = 0.9;
 
-/// Where a trace is cut.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Cut {
-    /// Samples of a pattern; without a trigger, all patterns have this number. With a trigger, the
-    /// number that its edges must show.
-    pub samples: Option<usize>,
-    /// Samples before the first pattern.
-    pub skip: usize,
-    /// Samples at the beginning of each pattern that its reading leaves out, while the light settles.
-    pub settle: usize,
-}
+/// Parts of a trigger's range: it rises where it reaches the second one after it was below the first one.
+const LOW: f64 = 0.4;
+const HIGH: f64 = 0.6;
 
-/// The samples of each pattern, and the readings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Found {
-    /// The samples that make each reading; `None` for a pattern without a trigger.
-    pub windows: Vec<Option<Range<usize>>>,
-    /// The mean of each window; NaN without one.
-    pub readings: Vec<f64>,
+/// The samples of every reading, in turn.
+#[derive(Debug, Clone)]
+pub(super) struct Windows {
+    starts: Starts,
     /// Samples of a pattern: the middle one of all intervals.
-    pub samples: usize,
-    /// What was odd, one line each.
-    pub notes: Vec<String>,
+    pub(super) samples: usize,
+    /// Samples at the beginning of each pattern that belong to no reading.
+    settle: usize,
+    /// Samples of the trace.
+    end: usize,
 }
 
-/// Why a trace gives no readings.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum TraceError {
-    /// Neither a trigger nor a number of samples.
-    #[error("no trigger and no number of samples of a pattern, expected one of them")]
-    NoCut,
-    /// The trigger has fewer than two edges.
-    #[error("the trigger rises {found} times, expected two times or more")]
-    NoEdges {
-        /// Number of edges.
-        found: usize,
+#[derive(Debug, Clone)]
+enum Starts {
+    Every {
+        first: usize,
+        count: usize,
     },
-    /// The trigger has another interval.
-    #[error("{asked} samples of a pattern, but the trigger rises every {found} samples")]
-    Interval {
-        /// The number that was asked for.
-        asked: usize,
-        /// The trigger's.
-        found: usize,
-    },
-    /// Nothing is left of a pattern.
-    #[error("{settle} samples to settle leave nothing of the {samples} samples of a pattern")]
-    Settle {
-        /// Samples to settle.
-        settle: usize,
-        /// Samples of a pattern.
-        samples: usize,
-    },
-    /// The trace ends before the first pattern does.
-    #[error("{found} samples after the {skip} skipped, expected {samples} for a pattern")]
-    Short {
-        /// Samples left.
-        found: usize,
-        /// Samples skipped.
-        skip: usize,
-        /// Samples of a pattern.
-        samples: usize,
+    Edges {
+        edges: Vec<usize>,
+        /// Whether the last edge begins a pattern, and not only ends one.
+        last_begins: bool,
     },
 }
 
-impl Trace {
-    /// The reading of each pattern: the mean of its samples.
-    ///
-    /// With a trigger, a pattern begins where the trigger rises through the middle of its range, and ends
-    /// where it rises again.
-    ///
-    /// # Errors
-    /// [`TraceError`] if the trace cannot be cut this way.
-    pub fn cut(&self, cut: Cut) -> Result<Found, TraceError> {
-        let mut notes = Vec::new();
-        let (starts, samples) = match &self.trigger {
-            Some(trigger) => by_trigger(trigger, cut, &mut notes)?,
-            None => by_number(self.samples.len(), cut, &mut notes)?,
+impl Windows {
+    /// Windows of `samples` each after `skip` others.
+    pub(super) fn every(samples: usize, skip: usize, settle: usize, end: usize) -> Self {
+        let count = end.saturating_sub(skip) / samples;
+        Self { starts: Starts::Every { first: skip, count }, samples, settle, end }
+    }
+
+    /// The samples of each reading, none for a pattern without an edge.
+    pub(super) fn iter(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let (first, count, edges, last_begins) = match &self.starts {
+            Starts::Every { first, count } => (*first, *count, &[][..], false),
+            Starts::Edges { edges, last_begins } => (0, 0, &**edges, *last_begins),
         };
-        if cut.settle >= samples {
-            return Err(TraceError::Settle { settle: cut.settle, samples });
+        let every = (0..count).map(move |k| {
+            let start = first + k * self.samples;
+            self.settled(start, start + self.samples)
+        });
+        let between = edges.windows(2).flat_map(move |pair| {
+            let patterns = self.patterns(pair[1] - pair[0]);
+            let end = if patterns == 1 { pair[1] } else { pair[0] + self.samples };
+            let lost = std::iter::repeat_n(0..0, patterns - 1);
+            std::iter::once(self.settled(pair[0], end)).chain(lost)
+        });
+        let last = edges.last().filter(|_| last_begins);
+        let last = last.map(|&edge| self.settled(edge, (edge + self.samples).min(self.end)));
+        every.chain(between).chain(last)
+    }
+
+    /// Number of patterns that are as long as this.
+    fn patterns(&self, interval: usize) -> usize {
+        ((interval as f64 / self.samples as f64).round() as usize).max(1)
+    }
+
+    fn settled(&self, start: usize, end: usize) -> Range<usize> {
+        if start + self.settle < end { start + self.settle..end } else { 0..0 }
+    }
+
+    /// The first sample of the first pattern.
+    pub(super) fn first(&self) -> usize {
+        match &self.starts {
+            Starts::Every { first, .. } => *first,
+            Starts::Edges { edges, .. } => edges.first().copied().unwrap_or(0),
         }
-        let window = |&(start, length): &(Option<usize>, usize)| {
-            start.map(|start| start + cut.settle..start + length)
-        };
-        let windows: Vec<_> = starts.iter().map(window).collect();
-        let mean = |window: &Option<Range<usize>>| match window {
-            Some(window) => {
-                let count = window.len() as f64;
-                self.samples[window.clone()].iter().map(|sample| sample / count).sum()
-            }
-            None => f64::NAN,
-        };
-        let readings = windows.iter().map(mean).collect();
-        Ok(Found { windows, readings, samples, notes })
+    }
+
+    /// Where the trigger rises at the beginning of a pattern; nothing without a trigger.
+    pub(super) fn edges(&self) -> &[usize] {
+        match &self.starts {
+            Starts::Every { .. } => &[],
+            Starts::Edges { edges, .. } => edges,
+        }
     }
 }
 
-/// The first sample of each pattern, and its number of samples.
-type Starts = Vec<(Option<usize>, usize)>;
-
-fn by_number(
-    length: usize,
-    cut: Cut,
-    notes: &mut Vec<String>,
-) -> Result<(Starts, usize), TraceError> {
-    let samples = cut.samples.filter(|&samples| samples > 0).ok_or(TraceError::NoCut)?;
-    let found = length.saturating_sub(cut.skip);
-    let count = found / samples;
-    if count == 0 {
-        return Err(TraceError::Short { found, skip: cut.skip, samples });
-    }
-    let left = found - count * samples;
-    if left > 0 {
-        notes
-            .push(format!("{left} samples at the end are left over: less than those of a pattern"));
-    }
-    Ok(((0..count).map(|k| (Some(cut.skip + k * samples), samples)).collect(), samples))
+/// Finds where a trigger rises, a block of its samples at a time.
+pub(super) struct Edges {
+    low: f64,
+    high: f64,
+    /// The next sample's place.
+    at: usize,
+    skip: usize,
+    most: usize,
+    was_low: bool,
+    /// Whether the first edge is the beginning of the trace, where the trigger is high.
+    begins_high: bool,
+    found: Vec<usize>,
 }
 
-fn by_trigger(
-    trigger: &[f64],
-    cut: Cut,
-    notes: &mut Vec<String>,
-) -> Result<(Starts, usize), TraceError> {
-    let range = |of: fn(f64, f64) -> f64, from| trigger.iter().copied().fold(from, of);
-    let level = f64::midpoint(range(f64::min, f64::INFINITY), range(f64::max, f64::NEG_INFINITY));
-    let rises = |at: &usize| trigger[at - 1] < level && trigger[*at] >= level;
-    let edges: Vec<usize> = (cut.skip.max(1)..trigger.len()).filter(rises).collect();
-    let mut intervals: Vec<usize> = edges.windows(2).map(|two| two[1] - two[0]).collect();
-    if intervals.is_empty() {
-        return Err(TraceError::NoEdges { found: edges.len() });
-    }
-    intervals.sort_unstable();
-    let samples = intervals[intervals.len() / 2];
-    if let Some(asked) = cut.samples.filter(|&asked| asked != samples) {
-        return Err(TraceError::Interval { asked, found: samples });
-    }
-    let usual = samples as f64;
-    let mut starts: Starts = Vec::with_capacity(edges.len());
-    let (mut extra, mut lost) = (Vec::new(), Vec::new());
-    let mut last = edges[0];
-    for &edge in edges[1..].iter().chain([&trigger.len()]) {
-        let interval = (edge - last) as f64;
-        let is_end = edge == trigger.len();
-        if is_end {
-            match interval >= WHOLE * usual {
-                true => starts.push((Some(last), samples.min(edge - last))),
-                false => notes.push(format!(
-                    "the trace ends {} samples after the last edge: this pattern is left out",
-                    edge - last
-                )),
-            }
-            break;
-        }
-        if interval < EXTRA * usual {
-            extra.push(edge);
-            continue;
-        }
-        let patterns = (interval / usual).round().max(1.0) as usize;
-        starts.push((Some(last), if patterns == 1 { edge - last } else { samples }));
-        for _ in 1..patterns {
-            lost.push(starts.len());
-            starts.push((None, 0));
-        }
-        last = edge;
-    }
-    if !extra.is_empty() {
-        notes.push(format!("edges that come too early are left out: {}", first_of(&extra)));
-    }
-    if !lost.is_empty() {
-        notes.push(format!("patterns without an edge have no reading: {}", first_of(&lost)));
-    }
-    Ok((starts, samples))
+/// What the edges of a trigger are.
+pub(super) struct Cut {
+    pub(super) windows: Windows,
+    /// Edges that come too early and begin no pattern.
+    pub(super) extra: Vec<usize>,
+    /// Samples after the last edge, if they are too few for a pattern.
+    pub(super) cut_off: Option<usize>,
 }
 
-/// The first numbers of a list, and how many there are.
-fn first_of(numbers: &[usize]) -> String {
-    const SHOWN: usize = 5;
-    let shown: Vec<String> = numbers.iter().take(SHOWN).map(usize::to_string).collect();
-    let more = numbers.len().saturating_sub(SHOWN);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("{}{more}", shown.join(", "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    /// A trace of these levels, of so many samples each after some others, and its trigger.
-    fn trace(levels: &[f64], samples: usize, before: usize) -> Trace {
-        let each = |of: &dyn Fn(usize, usize) -> f64| {
-            let pattern = (0..levels.len()).flat_map(|k| (0..samples).map(move |at| (k, at)));
-            std::iter::repeat_n(0.0, before).chain(pattern.map(|(k, at)| of(k, at))).collect()
-        };
-        Trace {
-            samples: each(&|k, _| levels[k]),
-            trigger: Some(each(&|_, at| if at < 2 { 5.0 } else { 0.1 })),
-            note: None,
+impl Edges {
+    /// Edges of a trigger within this range, behind the first `skip` samples, and one more than `most` of them.
+    pub(super) fn new((least, greatest): (f64, f64), skip: usize, most: usize) -> Self {
+        let level = |part: f64| (1.0 - part) * least + part * greatest;
+        Self {
+            low: level(LOW),
+            high: level(HIGH),
+            at: 0,
+            skip,
+            most,
+            was_low: false,
+            begins_high: false,
+            found: Vec::new(),
         }
     }
 
-    proptest! {
-        #[test]
-        fn readings_are_the_levels_by_the_trigger_and_by_their_number(
-            levels in proptest::collection::vec(-9.0..9.0_f64, 2..60),
-            samples in 4_usize..40,
-            before in 1_usize..200,
-            settle in 0_usize..3,
-        ) {
-            let by_trigger = trace(&levels, samples, before);
-            let number = Trace { trigger: None, ..by_trigger.clone() };
-            let cut = Cut { settle, ..Cut::default() };
-            let counted = Cut { samples: Some(samples), skip: before, settle };
-            for found in [by_trigger.cut(cut).unwrap(), number.cut(counted).unwrap()] {
-                prop_assert_eq!(found.samples, samples);
-                prop_assert_eq!(found.readings.len(), levels.len());
-                for (reading, level) in found.readings.iter().zip(&levels) {
-                    prop_assert!((reading - level).abs() < 1e-9);
+    pub(super) fn take(&mut self, block: &[f64]) {
+        for &level in block {
+            if self.at >= self.skip {
+                if self.at == self.skip && level >= self.high && level > self.low {
+                    self.begins_high = true;
+                    self.found.push(self.at);
+                } else if level < self.low {
+                    self.was_low = true;
+                } else if self.was_low && level >= self.high {
+                    self.was_low = false;
+                    if self.found.len() <= self.most {
+                        self.found.push(self.at);
+                    }
                 }
-                prop_assert!(found.notes.is_empty());
-                prop_assert!(found.windows.iter().flatten().all(|w| w.len() == samples - settle));
             }
+            self.at += 1;
         }
     }
 
-    #[test]
-    fn lost_and_extra_edges_are_named_and_move_no_other_reading() {
-        let levels: Vec<f64> = (0..12).map(f64::from).collect();
-        let mut spoilt = trace(&levels, 20, 7);
-        let trigger = spoilt.trigger.as_mut().unwrap();
-        // The edge of pattern 4, and one in the middle of pattern 8.
-        trigger[7 + 4 * 20..][..2].fill(0.0);
-        trigger[7 + 8 * 20 + 6] = 5.0;
-        let found = spoilt.cut(Cut::default()).unwrap();
-        assert_eq!(found.readings.len(), 12);
-        for (k, reading) in found.readings.iter().enumerate() {
-            assert!(
-                if k == 4 { reading.is_nan() } else { (reading - k as f64).abs() < 1e-9 },
-                "{k}"
-            );
-        }
-        assert_eq!(
-            found.notes,
-            [
-                "edges that come too early are left out: 173",
-                "patterns without an edge have no reading: 4"
-            ]
-        );
-        // Samples that jitter.
-        let mut jitter = trace(&levels, 20, 7);
-        jitter.samples.remove(50);
-        jitter.trigger.as_mut().unwrap().remove(50);
-        let found = jitter.cut(Cut { settle: 2, ..Cut::default() }).unwrap();
-        assert!(found.readings.iter().zip(&levels).all(|(a, b)| (a - b).abs() < 1e-9));
-        // A trace that ends early.
-        let mut short = trace(&levels, 20, 7);
-        short.samples.truncate(7 + 11 * 20 + 9);
-        short.trigger.as_mut().unwrap().truncate(7 + 11 * 20 + 9);
-        let found = short.cut(Cut::default()).unwrap();
-        assert_eq!(found.readings.len(), 11);
-        assert!(found.notes[0].contains("ends 9 samples after the last edge"), "{:?}", found.notes);
+    /// Number of edges.
+    pub(super) fn count(&self) -> usize {
+        self.found.len() - usize::from(self.begins_high)
     }
 
-    #[test]
-    fn what_cannot_be_cut_is_refused_in_one_line() {
-        let good = trace(&[1.0, 2.0, 3.0], 20, 5);
-        let told = |trace: &Trace, cut| trace.cut(cut).unwrap_err().to_string();
-        let of = |samples, skip, settle| Cut { samples: Some(samples), skip, settle };
-        let found = told(&good, of(25, 0, 0));
-        assert_eq!(found, "25 samples of a pattern, but the trigger rises every 20 samples");
-        let number = Trace { trigger: None, ..good.clone() };
-        assert!(told(&number, Cut::default()).contains("expected one of them"));
-        assert!(told(&number, of(0, 0, 0)).contains("expected one of them"));
-        assert!(told(&number, of(20, 1000, 0)).starts_with("0 samples after the 1000 skipped"));
-        assert!(told(&number, of(20, 5, 20)).starts_with("20 samples to settle leave nothing"));
-        let flat = Trace { trigger: Some(vec![1.0; 65]), ..good };
-        assert_eq!(
-            told(&flat, Cut::default()),
-            "the trigger rises 0 times, expected two times or more"
-        );
-        let left = number.cut(of(20, 0, 0)).unwrap();
-        assert_eq!(left.readings.len(), 3);
-        assert!(left.notes[0].starts_with("5 samples at the end are left over"));
+    /// The patterns that the edges begin; `None` for fewer than two edges.
+    pub(super) fn cut(mut self, settle: usize) -> Option<Cut> {
+        let real = &self.found[usize::from(self.begins_high)..];
+        let mut intervals: Vec<usize> = real.windows(2).map(|two| two[1] - two[0]).collect();
+        let middle = intervals.len() / 2;
+        if intervals.is_empty() {
+            return None;
+        }
+        let samples = *intervals.select_nth_unstable(middle).1;
+        drop(intervals);
+        let usual = samples as f64;
+        // The trace may begin with the first pattern, or within the time in which the trigger is high.
+        let is_whole = |interval: usize| (interval as f64 / usual - 1.0).abs() <= 1.0 - WHOLE;
+        if self.begins_high && !is_whole(self.found[1] - self.found[0]) {
+            self.found.remove(0);
+        }
+        let mut extra = Vec::new();
+        let mut last = None;
+        self.found.retain(|&edge| {
+            let early = last.is_some_and(|last| ((edge - last) as f64) < EXTRA * usual);
+            if early {
+                extra.push(edge)
+            } else {
+                last = Some(edge)
+            }
+            !early
+        });
+        let tail = self.at - last?;
+        let last_begins = tail as f64 >= WHOLE * usual;
+        let starts = Starts::Edges { edges: self.found, last_begins };
+        let windows = Windows { starts, samples, settle, end: self.at };
+        Some(Cut { windows, extra, cut_off: (!last_begins).then_some(tail) })
     }
 }
