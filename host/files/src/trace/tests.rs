@@ -34,9 +34,8 @@ impl Made {
     }
 
     fn read(&self, cut: &Cut) -> Result<Found, FileError> {
-        let shape = format!("({},)", self.samples.len());
-        let members =
-            [("y.npy", npy_f64(&shape, &self.samples)), ("T.npy", npy_f64(&shape, &self.trigger))];
+        let array = |values: &[f64]| npy_f64(&format!("({},)", values.len()), values);
+        let members = [("y.npy", array(&self.samples)), ("T.npy", array(&self.trigger))];
         let (_guard, path) = file("trace.npz", &zip(Zip::Stored, &members));
         read(&path, &Cut { field: Some("y".to_owned()), ..cut.clone() })
     }
