@@ -3,7 +3,7 @@
 use super::report::{Overwrite, ReportArgs, words};
 use super::{Usage, print, provenance};
 use anyhow::Result;
-use nirspi::files::measurement::encode_readings;
+use nirspi::files::measurement::write_readings;
 use nirspi::files::output::{Existing, write_result};
 use nirspi::files::trace::{self, Cut, Raw};
 use nirspi::picture::{of_trace, signed_png};
@@ -123,8 +123,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         overloads: found.overloads,
         extra_edges: found.extra,
     };
-    let encoded = encode_readings(out, found.readings, &provenance)?;
-    write_result(out, existing, &encoded)?;
+    write_readings(out, existing, &found.readings, &provenance)?;
     write_result(&report.picture, existing, &drawn)?;
     args.report.print(&report, &provenance, |report| {
         report.words.iter().try_for_each(print::line)?;

@@ -6,11 +6,14 @@
 //! numbers are read is read to its end, so the checksum of numbers is always verified
 //! (`measurement::tests::a_changed_reading_is_caught_by_the_checksum`).
 
+mod members;
+
 use super::FileError;
 use super::array::{ArrayError, Header, MAX_MEMORY_BYTES, NUMBERS, Sample, claims, has_shape};
 use super::field::Field;
 use super::plain::{kind_by_start, open_file};
 use super::stored::{EXPECTED, Stored, damaged};
+pub use members::{Members, write_members};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};

@@ -61,8 +61,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn readings_are_the_levels_by_the_trigger_and_by_their_number(
-        levels in proptest::collection::vec(-9.0..9.0_f64, 3..60),
-        samples in 4_usize..400,
+        levels in proptest::collection::vec(-9.0..9.0_f64, 3..20),
+        samples in 4_usize..4000,
         before in 1_usize..20_000,
         settle in 0_usize..3,
     ) {
@@ -78,8 +78,12 @@ proptest! {
             prop_assert!(found.first.windows.iter().all(|w| w.len() == samples - settle));
             let of_trace = |&(at, value): &(usize, f64)| made.samples[at].to_bits() == value.to_bits();
             prop_assert!(found.first.samples.iter().all(of_trace));
+            let steps = found.first.samples.windows(2).map(|two| two[1].0 - two[0].0);
+            let mut steps: Vec<usize> = steps.collect();
+            steps.dedup();
+            prop_assert_eq!(steps.len(), 1, "samples of a picture are evenly chosen");
             prop_assert!(found.first.samples.len() <= 4000);
-            prop_assert!(found.first.samples.len() >= samples.min(3000));
+            prop_assert!(found.first.samples.len() >= samples.min(2000));
         }
     }
 }

@@ -4,6 +4,7 @@ use crate::{Law, MIB, place, read};
 use nirspi::files::measurement::{
     self, MeasurementFile, Readings, Selection, Several, read_images_of, read_plain,
 };
+use nirspi::files::output::Existing;
 use nirspi::files::table::Table;
 use nirspi::files::trace::{self, Cut, Raw};
 use nirspi::files::{FileError, npy, problem};
@@ -402,8 +403,8 @@ fn traces(bytes: &[u8]) {
         assert!(first.samples.windows(2).all(|two| two[0].0 < two[1].0));
         found.words().iter().chain(&found.warnings()).for_each(|line| crate::is_one_line(line));
         let again = place::path("again.npz");
-        let bytes = measurement::encode_readings(&again, readings.clone(), &provenance());
-        std::fs::write(&again, bytes.expect("an archive")).expect("its file");
+        let existing = Existing::Replaced { made_of: None };
+        measurement::write_readings(&again, existing, readings, &provenance()).expect("its file");
         if named_none(&found) {
             let cut = Cut { field: Some("y".to_owned()), samples: Some(1), ..Cut::default() };
             let back = trace::read(&again, &cut).expect("our own file");
