@@ -9,7 +9,9 @@
 mod members;
 
 use super::FileError;
-use super::array::{ArrayError, Header, MAX_MEMORY_BYTES, NUMBERS, Sample, claims, has_shape};
+use super::array::{
+    ArrayError, Header, MAX_MEMORY_BYTES, NUMBERS, Sample, Take, claims, has_shape,
+};
 use super::field::Field;
 use super::plain::{kind_by_start, open_file};
 use super::stored::{EXPECTED, Stored, damaged};
@@ -158,7 +160,7 @@ impl Archive {
         &mut self,
         field: &str,
         accept: impl FnOnce(&[u64]) -> Result<(), String>,
-        take: Option<&mut dyn FnMut(&[f64])>,
+        take: Option<&mut Take<'_>>,
     ) -> Result<Vec<usize>, FileError> {
         let (shape, ()) = self.member(field, accept, |header, member| match take {
             Some(take) => header.each_block(member, u64::MAX, take),

@@ -21,6 +21,9 @@ pub(super) const MAX_AXES: usize = 32;
 /// writers.
 const MAX_HEADER_BYTES: u32 = 65_536;
 
+/// What takes the numbers of an array, a block of them at a time.
+pub(super) type Take<'t> = dyn FnMut(&[f64]) + 't;
+
 /// Numbers that are decoded at a time while their bytes are in a processor's cache.
 const BLOCK: usize = 1 << 14;
 

@@ -6,7 +6,7 @@
 //! (`tests::what_is_written_reads_back_bit_for_bit`).
 
 use super::FileError;
-use super::array::{ArrayError, Header, MAGIC, MAX_AXES, NUMBERS, Sample, shape_text};
+use super::array::{ArrayError, Header, MAGIC, MAX_AXES, NUMBERS, Sample, Take, shape_text};
 use super::field::Field;
 use super::plain::{kind_by_start, open_file};
 use std::borrow::Cow;
@@ -182,7 +182,7 @@ pub(super) fn each_block(
     expected: &'static str,
     fits: impl Fn(&[u64]) -> bool,
     shapes: &str,
-    take: Option<&mut dyn FnMut(&[f64])>,
+    take: Option<&mut Take<'_>>,
 ) -> Result<Vec<u64>, FileError> {
     let decode = |header: &Header, stream: &mut BufReader<File>, limit| match take {
         Some(take) => header.each_block(stream, limit, take),

@@ -7,7 +7,7 @@
 
 use super::{FileError, Raw};
 use crate::archive::Archive;
-use crate::array::{ArrayError, Header, MAGIC};
+use crate::array::{ArrayError, Header, MAGIC, Take};
 use crate::field::EXPECTED as MEASUREMENTS;
 use crate::fields::{Fields, UNNAMED};
 use crate::npy;
@@ -92,7 +92,7 @@ impl Series {
             Raw::I16 => ("<i2", 2, "16-bit integers, 2 bytes each"),
         };
         let wrong = || FileError::kind(path, format!("{length} bytes"), expected);
-        if length % bytes != 0 {
+        if !length.is_multiple_of(bytes) {
             return Err(wrong());
         }
         let header = Header::of_numbers(descr, length / bytes).map_err(|_| wrong())?;
@@ -137,7 +137,7 @@ impl Series {
         &mut self,
         field: &str,
         shape: Shape,
-        take: &mut dyn FnMut(&[f64]),
+        take: &mut Take<'_>,
     ) -> Result<(), FileError> {
         self.read(field, shape, Some(take)).map(|_| ())
     }
@@ -146,7 +146,7 @@ impl Series {
         &mut self,
         field: &str,
         shape: Shape,
-        take: Option<&mut dyn FnMut(&[f64])>,
+        take: Option<&mut Take<'_>>,
     ) -> Result<Vec<u64>, FileError> {
         let path = &self.path;
         let axes = |shape: Vec<usize>| shape.into_iter().map(|axis| axis as u64).collect();

@@ -175,9 +175,9 @@ impl Edges {
         self.found.retain(|&edge| {
             let early = last.is_some_and(|last| ((edge - last) as f64) < EXTRA * usual);
             if early {
-                extra.push(edge)
+                extra.push(edge);
             } else {
-                last = Some(edge)
+                last = Some(edge);
             }
             !early
         });
