@@ -34,6 +34,7 @@ mod progress;
 mod provenance;
 mod rain;
 mod range;
+mod readings;
 mod reconstruct;
 mod report;
 mod safety;
@@ -95,6 +96,7 @@ commands! {
     Demo(demo::Args) => demo::run,
     Example(example::Args) => example::run,
     Reconstruct(reconstruct::Args) => reconstruct::run,
+    Readings(readings::Args) => readings::run,
     Capture(capture::Args) => capture::run,
     Export(export::Args) => export::run,
     Recover(export::RecoverArgs) => export::recover,

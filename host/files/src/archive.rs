@@ -6,11 +6,16 @@
 //! numbers are read is read to its end, so the checksum of numbers is always verified
 //! (`measurement::tests::a_changed_reading_is_caught_by_the_checksum`).
 
+mod members;
+
 use super::FileError;
-use super::array::{ArrayError, Header, MAX_MEMORY_BYTES, NUMBERS, Sample, claims, has_shape};
+use super::array::{
+    ArrayError, Header, MAX_MEMORY_BYTES, NUMBERS, Sample, Take, claims, has_shape,
+};
 use super::field::Field;
 use super::plain::{kind_by_start, open_file};
 use super::stored::{EXPECTED, Stored, damaged};
+pub use members::{Members, write_members};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
@@ -145,6 +150,21 @@ impl Archive {
         let (shape, ()) = self.member(field, accept, |header, _| {
             header.data_bytes(MAX_FIELD_BYTES)?;
             header.fits::<f64>(MAX_MEMORY_BYTES)
+        })?;
+        Ok(shape)
+    }
+
+    /// The shape of a field of any size, and what `take` makes of its numbers, a block of them at a time; the numbers are not
+    /// read without it. `accept` is that of [`numbers`](Self::numbers).
+    pub(super) fn each_block(
+        &mut self,
+        field: &str,
+        accept: impl FnOnce(&[u64]) -> Result<(), String>,
+        take: Option<&mut Take<'_>>,
+    ) -> Result<Vec<usize>, FileError> {
+        let (shape, ()) = self.member(field, accept, |header, member| match take {
+            Some(take) => header.each_block(member, u64::MAX, take),
+            None => header.data_bytes(u64::MAX).map(|_| ()),
         })?;
         Ok(shape)
     }

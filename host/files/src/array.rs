@@ -21,6 +21,12 @@ pub(super) const MAX_AXES: usize = 32;
 /// writers.
 const MAX_HEADER_BYTES: u32 = 65_536;
 
+/// What takes the numbers of an array, a block of them at a time.
+pub(super) type Take<'t> = dyn FnMut(&[f64]) + 't;
+
+/// Numbers that are decoded at a time while their bytes are in a processor's cache.
+const BLOCK: usize = 1 << 14;
+
 /// The numeric types that the reader accepts, for error messages.
 pub(super) const NUMBERS: &str = "real numbers of up to 8 bytes";
 
@@ -118,6 +124,12 @@ impl Header {
         Ok(Self { dtype, fortran_order, shape, header_bytes: 8 + length_bytes + u64::from(length) })
     }
 
+    /// The header of `count` numbers that have none in their file; `descr` is their type as NumPy writes it.
+    pub(super) fn of_numbers(descr: &str, count: u64) -> Result<Self, ArrayError> {
+        let dtype = Dtype::parse(&format!("'{descr}'"))?;
+        Ok(Self { dtype, fortran_order: false, shape: vec![count], header_bytes: 0 })
+    }
+
     /// Sizes of the axes as the header claims them; empty for a single number.
     pub(super) fn shape(&self) -> &[u64] {
         &self.shape
@@ -180,6 +192,35 @@ impl Header {
         }
     }
 
+    /// Reads the elements as [`read_data`](Self::read_data) does, and hands out a block of them at a time: the memory holds one
+    /// block, unless the elements must be reordered.
+    pub(super) fn each_block(
+        &self,
+        stream: &mut impl Read,
+        limit_bytes: u64,
+        mut take: impl FnMut(&[f64]),
+    ) -> Result<(), ArrayError> {
+        if !self.is_plain() {
+            self.fits::<f64>(MAX_MEMORY_BYTES)?;
+            take(&self.read_data::<f64>(stream, limit_bytes)?);
+            return Ok(());
+        }
+        let expected = self.data_bytes(limit_bytes)?;
+        let most = (BLOCK * self.dtype.size) as u64;
+        let mut bytes = vec![0; expected.min(most) as usize];
+        let mut numbers = vec![0.0; bytes.len() / self.dtype.size];
+        let mut read = 0;
+        while read < expected {
+            let now = (expected - read).min(most) as usize;
+            fill_data(stream, &mut bytes[..now], read, expected)?;
+            let numbers = &mut numbers[..now / self.dtype.size];
+            self.dtype.decode_into(&bytes[..now], numbers);
+            take(numbers);
+            read += now as u64;
+        }
+        ends(stream, expected)
+    }
+
     fn read_bytes(&self, stream: &mut impl Read, limit_bytes: u64) -> Result<Vec<u8>, ArrayError> {
         let expected = self.data_bytes(limit_bytes)?;
         let mut bytes = Vec::new();
@@ -190,11 +231,7 @@ impl Header {
                 bytes.len()
             )));
         }
-        if stream.read(&mut [0]).map_err(ArrayError::Io)? != 0 {
-            return Err(ArrayError::Damaged(format!(
-                "more than the {expected} bytes of data of its header"
-            )));
-        }
+        ends(stream, expected)?;
         Ok(bytes)
     }
 
@@ -267,6 +304,38 @@ fn fill(stream: &mut impl Read, buffer: &mut [u8], part: &str) -> Result<(), Arr
         io::ErrorKind::UnexpectedEof => ArrayError::Damaged(format!("it ends inside {part}")),
         _ => ArrayError::Io(error),
     })
+}
+
+/// Fills a buffer with data, of which `read` of `expected` bytes were read before.
+fn fill_data(
+    stream: &mut impl Read,
+    buffer: &mut [u8],
+    read: u64,
+    expected: u64,
+) -> Result<(), ArrayError> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match stream.read(&mut buffer[filled..]) {
+            Ok(0) => {
+                let found = read + filled as u64;
+                return Err(ArrayError::Damaged(format!("{found} of {expected} bytes of data")));
+            }
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(ArrayError::Io(error)),
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a stream that goes on after its data.
+fn ends(stream: &mut impl Read, expected: u64) -> Result<(), ArrayError> {
+    match stream.read(&mut [0]).map_err(ArrayError::Io)? {
+        0 => Ok(()),
+        _ => Err(ArrayError::Damaged(format!(
+            "more than the {expected} bytes of data of its header"
+        ))),
+    }
 }
 
 /// Parses the three values of `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }`. The

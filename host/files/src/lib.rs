@@ -33,6 +33,8 @@ pub mod problem;
 pub mod provenance;
 pub mod settings;
 pub mod table;
+#[cfg(not(target_family = "wasm"))]
+pub mod trace;
 
 #[cfg(not(target_family = "wasm"))]
 mod array;

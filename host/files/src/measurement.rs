@@ -54,7 +54,7 @@ pub use plain::{Plain, read_plain};
 use rayon::prelude::*;
 pub use stack::Stack;
 use std::path::Path;
-pub use write::{NOISE, PROVENANCE, encode};
+pub use write::{NOISE, PROVENANCE, encode, write_readings};
 
 /// What to read from a file, and what the file itself does not say.
 #[derive(Debug, Clone, Default, PartialEq)]

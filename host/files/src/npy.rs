@@ -6,7 +6,7 @@
 //! (`tests::what_is_written_reads_back_bit_for_bit`).
 
 use super::FileError;
-use super::array::{ArrayError, Header, MAGIC, MAX_AXES, NUMBERS, Sample, shape_text};
+use super::array::{ArrayError, Header, MAGIC, MAX_AXES, NUMBERS, Sample, Take, shape_text};
 use super::field::Field;
 use super::plain::{kind_by_start, open_file};
 use std::fs::File;
@@ -122,6 +122,22 @@ pub(super) fn read_field(path: &Path) -> Result<Field, FileError> {
     Ok(Field { shape, real, imaginary })
 }
 
+/// The shape of a `.npy` file of any shape that `fits`, and what `take` makes of its numbers, a block of them at a time; the
+/// numbers are not read without it.
+pub(super) fn each_block(
+    path: &Path,
+    expected: &'static str,
+    fits: impl Fn(&[u64]) -> bool,
+    shapes: &str,
+    take: Option<&mut Take<'_>>,
+) -> Result<Vec<u64>, FileError> {
+    let decode = |header: &Header, stream: &mut BufReader<File>, limit| match take {
+        Some(take) => header.each_block(stream, limit, take),
+        None => header.data_bytes(limit).map(|_| ()),
+    };
+    Ok(read_array(path, expected, fits, shapes, decode)?.0.shape().to_vec())
+}
+
 /// Reads the header and the numbers of a `.npy` file whose shape fits.
 fn read_numbers<T: Sample>(
     path: &Path,
@@ -139,7 +155,7 @@ fn read_array<D>(
     expected: &'static str,
     fits: impl Fn(&[u64]) -> bool,
     shapes: &str,
-    decode: impl Fn(&Header, &mut BufReader<File>, u64) -> Result<D, ArrayError>,
+    decode: impl FnOnce(&Header, &mut BufReader<File>, u64) -> Result<D, ArrayError>,
 ) -> Result<(Header, D), FileError> {
     let (file, file_bytes) = open_file(path, expected)?;
     let mut stream = BufReader::new(file);

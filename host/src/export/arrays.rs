@@ -2,26 +2,22 @@
 
 use super::{ExportError, Whole};
 use crate::files::FileError;
+use crate::files::archive::write_members;
 use crate::files::measurement::{NOISE, PROVENANCE};
 use crate::files::npy::{Element, encode, encode_text, header};
 use crate::files::output::{Existing, write_in_pieces, write_result};
 use crate::provenance::Provenance;
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipWriter};
 
-/// Writes a `.npz` file. Its members are not compressed, because readings are noise for a
-/// compressor.
+/// Writes a `.npz` file.
 pub(super) fn npz(
     whole: &Whole,
     out: &Path,
     existing: Existing<'_>,
     provenance: &Provenance,
 ) -> Result<(), ExportError> {
-    write_in_pieces(out, existing, |file| {
-        let mut file = Until { file, at: 0, ended: false };
-        let mut zip = Members { zip: ZipWriter::new(&mut file), out };
+    write_members(out, existing, |zip| {
         let rows = whole.source.measurements.rows();
         let h_row: Vec<i64> = rows.iter().map(|&row| row.into()).collect();
         let [m, count] = [h_row.len(), whole.frames()];
@@ -37,69 +33,8 @@ pub(super) fn npz(
         zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
         zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
         zip.begin("frames")?;
-        frames(whole, out, &mut zip.zip)?;
-        let wrong = |error: zip::result::ZipError| FileError::io(out, "write", error.into());
-        zip.zip.finish().map_err(wrong)?;
-        Ok(())
+        frames(whole, |bytes| zip.write(bytes))
     })
-}
-
-/// A file that takes bytes until its first error, and lets what follows go by. A `ZipWriter` that is dropped after an
-/// error tries to write its index all the same, and prints why it cannot; the first error is ours to tell.
-struct Until<W> {
-    file: W,
-    /// Where the next bytes go, or would go.
-    at: u64,
-    ended: bool,
-}
-
-impl<W: Write> Write for Until<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let taken = if self.ended { Ok(bytes.len()) } else { self.file.write(bytes) };
-        self.ended |= taken.is_err();
-        self.at += *taken.as_ref().unwrap_or(&0) as u64;
-        taken
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        let flushed = if self.ended { Ok(()) } else { self.file.flush() };
-        self.ended |= flushed.is_err();
-        flushed
-    }
-}
-
-impl<W: Seek> Seek for Until<W> {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let at = match to {
-            _ if !self.ended => self.file.seek(to),
-            SeekFrom::Start(at) => Ok(at),
-            SeekFrom::Current(by) | SeekFrom::End(by) => Ok(self.at.saturating_add_signed(by)),
-        };
-        self.ended |= at.is_err();
-        self.at = *at.as_ref().unwrap_or(&self.at);
-        at
-    }
-}
-
-struct Members<'o, W: Write + Seek> {
-    zip: ZipWriter<W>,
-    out: &'o Path,
-}
-
-impl<W: Write + Seek> Members<'_, W> {
-    fn begin(&mut self, field: &str) -> Result<(), FileError> {
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Stored)
-            .large_file(true);
-        self.zip
-            .start_file(format!("{field}.npy"), options)
-            .map_err(|error| FileError::io(self.out, "write", error.into()))
-    }
-
-    fn add(&mut self, field: &str, bytes: &[u8]) -> Result<(), FileError> {
-        self.begin(field)?;
-        self.zip.write_all(bytes).map_err(|error| FileError::io(self.out, "write", error))
-    }
 }
 
 /// Writes the readings of each frame as one array (F, M), and the provenance into a file beside it.
@@ -111,7 +46,11 @@ pub(super) fn npy(
 ) -> Result<(), ExportError> {
     let beside = beside(out);
     existing.check(&beside)?;
-    write_in_pieces(out, existing, |file| frames(whole, out, file))?;
+    write_in_pieces(out, existing, |file| {
+        frames(whole, |bytes| {
+            file.write_all(bytes).map_err(|error| FileError::io(out, "write", error))
+        })
+    })?;
     let text = provenance.sign(&serde_json::json!({})).unwrap_or_default();
     Ok(write_result(&beside, existing, text.as_bytes())?)
 }
@@ -123,17 +62,18 @@ fn beside(out: &Path) -> PathBuf {
     name.into()
 }
 
-fn frames(whole: &Whole, out: &Path, to: &mut impl Write) -> Result<(), ExportError> {
-    let write = |to: &mut dyn Write, bytes: &[u8]| {
-        to.write_all(bytes).map_err(|error| FileError::io(out, "write", error))
-    };
+/// Hands out the bytes of a `.npy` file of all frames, piece by piece.
+fn frames(
+    whole: &Whole,
+    mut write: impl FnMut(&[u8]) -> Result<(), FileError>,
+) -> Result<(), ExportError> {
     let shape = [whole.frames(), whole.source.measurements.rows().len()];
-    write(to, &header::<f64>(&shape))?;
+    write(&header::<f64>(&shape))?;
     let mut bytes = Vec::new();
     whole.each(|_, measurements| {
         bytes.clear();
         measurements.values().iter().for_each(|value| value.append(&mut bytes));
-        Ok(write(to, &bytes)?)
+        Ok(write(&bytes)?)
     })
 }
 

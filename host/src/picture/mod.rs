@@ -25,6 +25,8 @@ mod signature;
 mod terminal;
 mod text;
 mod ticks;
+#[cfg(not(target_family = "wasm"))]
+mod trace;
 mod video;
 
 pub use chart::{Axis, Chart, Line};
@@ -35,6 +37,8 @@ pub use scale::{PERCENTILES, Range, Scale, Unit};
 pub use sheet::Sheet;
 pub use signature::signed_png;
 pub use terminal::{Tones, half_blocks};
+#[cfg(not(target_family = "wasm"))]
+pub use trace::of_trace;
 pub use video::of_images as video;
 
 pub use image::RgbImage;

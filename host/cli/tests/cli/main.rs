@@ -48,6 +48,7 @@ mod serve_guarded;
 mod serve_proxied;
 mod settings;
 mod sparse_problems;
+mod traces;
 mod update;
 mod versions;
 mod weights;

@@ -48,6 +48,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/quality.md", "metrics sharp.npy", "the user's stacks; tests/cli/metrics.rs"),
     ("docs/reliability.md", "serve_soak.py", "ten minutes; .ci/run crowd"),
     ("docs/measurements.md", "scheidt_car.npz", "data of another group; tests/cli/real_data.rs"),
+    ("docs/measurements.md", "nirspi readings", "the user's traces; tests/cli/traces.rs"),
     ("docs/measurements.md", "benches/", "the user's archive; tests/cli/many.rs"),
     (
         "docs/training.md",

@@ -1,6 +1,8 @@
 //! Writes measurements of nirspi as a file for other programs: NumPy `.npz`.
 
 use super::FileError;
+use crate::npy::Element;
+use crate::output::Existing;
 use crate::provenance::Provenance;
 use crate::{archive, npy};
 use nirspi_recon::Measurements;
@@ -11,6 +13,9 @@ pub const PROVENANCE: &str = "provenance";
 
 /// The field with the standard deviation of the noise of `d`, if it is known.
 pub const NOISE: &str = "noise";
+
+/// Readings that are encoded at a time.
+const PIECE: usize = 1 << 13;
 
 /// The bytes of a `.npz` file with `n`, `h_row`, `d`, its `noise` if that is known, and the provenance as
 /// JSON text. `simulated` is 1 if no real light was measured, and is left out if that is not known.
@@ -34,4 +39,30 @@ pub fn encode(
     members.extend(measurements.noise().map(|noise| (NOISE, npy::encode(&[], &[noise]))));
     members.extend(simulated.map(|s| ("simulated", npy::encode(&[], &[i64::from(s)]))));
     archive::encode(path, &members)
+}
+
+/// Writes readings of patterns that the file does not name to a `.npz` file, whole or not at all: `y`, and the provenance as
+/// JSON text.
+///
+/// # Errors
+/// [`FileError`], if the name is taken or the system refuses.
+pub fn write_readings(
+    path: &Path,
+    existing: Existing<'_>,
+    readings: &[f64],
+    provenance: &Provenance,
+) -> Result<(), FileError> {
+    archive::write_members(path, existing, |zip| {
+        zip.add(PROVENANCE, &npy::encode_text(&provenance.json()))?;
+        zip.begin("y")?;
+        zip.write(&npy::header::<f64>(&[readings.len()]))?;
+        // Millions of readings are not in memory twice.
+        let mut bytes = Vec::new();
+        for piece in readings.chunks(PIECE) {
+            bytes.clear();
+            piece.iter().for_each(|reading| reading.append(&mut bytes));
+            zip.write(&bytes)?;
+        }
+        Ok(())
+    })
 }

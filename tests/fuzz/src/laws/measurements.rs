@@ -5,7 +5,9 @@ use nirspi::files::measurement::{
     self, MeasurementFile, PatternSelection, Plain, Readings, Selection, Several, read_images_of,
     read_plain,
 };
+use nirspi::files::output::Existing;
 use nirspi::files::table::Table;
+use nirspi::files::trace::{self, Cut, Raw};
 use nirspi::files::{FileError, npy, problem};
 use nirspi_recon::{Measurements, Order, Rows, Side, Size};
 use std::io::{Cursor, Write};
@@ -80,6 +82,20 @@ pub const LAWS: &[Law] = &[
         seeds: array_seeds,
         longest: 2048,
         most_memory: 8 * MIB,
+    },
+    Law {
+        name: "traces",
+        reads: "a trace: samples and a trigger, in a file of any format or without a heading",
+        readers: &[
+            "host/files/src/trace.rs",
+            "host/files/src/trace/series.rs",
+            "host/files/src/trace/sums.rs",
+            "host/files/src/trace/windows.rs",
+        ],
+        holds: traces,
+        seeds: trace_seeds,
+        longest: 4096,
+        most_memory: MEMORY,
     },
     Law {
         name: "tables",
@@ -357,6 +373,77 @@ fn array_seeds() -> Vec<Vec<u8>> {
         header("|u1", "False", "(2, 2, 2)", &[9; 8]),
         header("<c16", "True", "(1, 2L)", &[1; 32]),
         header("|b1", "False", "(4, 1)", &[1, 0, 1, 1]),
+    ]
+}
+
+/// How a trace may be cut.
+fn cuts() -> Vec<Cut> {
+    let name = |name: &str| Some(name.to_owned());
+    let every =
+        |samples, skip, settle| Cut { samples: Some(samples), skip, settle, ..Cut::default() };
+    let by_trigger = Cut { field: name("y"), trigger: name("d"), ..Cut::default() };
+    let raw = Raw::ALL.map(|raw| Cut { raw: Some(raw), ..every(3, 1, 1) });
+    [
+        every(1, 0, 0),
+        every(3, 2, 1),
+        Cut { field: name("y"), count: Some(2), ..every(2, 0, 0) },
+        Cut { settle: 2, skip: 1, ..by_trigger.clone() },
+        by_trigger,
+    ]
+    .into_iter()
+    .chain(raw)
+    .collect()
+}
+
+/// A reading is a number, or is named among those that are not there; what was read is written and reads the same.
+fn traces(bytes: &[u8]) {
+    let path = place::file("input", bytes);
+    for cut in cuts() {
+        let Some(found) = read(trace::read(&path, &cut)) else { continue };
+        let trace::Found { readings, lost, overloads, length, outside, first, .. } = &found;
+        assert!(!readings.is_empty() && readings.len() <= *length);
+        assert!(cut.count.is_none_or(|count| count == readings.len()));
+        assert!(outside.0 <= *length && outside.1 <= *length);
+        let missing = (0..readings.len()).filter(|&k| !readings[k].is_finite());
+        let mut named: Vec<usize> = lost.iter().chain(overloads).copied().collect();
+        named.sort_unstable();
+        assert!(missing.eq(named), "readings that are not there: {lost:?} {overloads:?}");
+        assert!(first.samples.len() <= 4000 && first.windows.len() <= readings.len());
+        assert!(first.windows.iter().all(|window| window.end <= *length));
+        assert!(first.samples.windows(2).all(|two| two[0].0 < two[1].0));
+        found.words().iter().chain(&found.warnings()).for_each(|line| crate::is_one_line(line));
+        let again = place::path("again.npz");
+        let existing = Existing::Replaced { made_of: None };
+        measurement::write_readings(&again, existing, readings, &provenance()).expect("its file");
+        if named_none(&found) {
+            let cut = Cut { field: Some("y".to_owned()), samples: Some(1), ..Cut::default() };
+            let back = trace::read(&again, &cut).expect("our own file");
+            assert_eq!(&back.readings, readings);
+        }
+    }
+}
+
+/// Whether every reading is there.
+fn named_none(found: &trace::Found) -> bool {
+    found.lost.is_empty() && found.overloads.is_empty()
+}
+
+fn trace_seeds() -> Vec<Vec<u8>> {
+    let samples: Vec<f64> = (0..60).map(|k| f64::from(k / 5 * 7 % 11)).collect();
+    let trigger: Vec<f64> = (0..60).map(|k| f64::from(u32::from(k % 5 == 0 && k != 20))).collect();
+    let field = |name: &str, values: &[f64]| {
+        let at = NAMES.iter().position(|known| *known == name).expect("a name") as u8;
+        let array = npy::encode(&[values.len()], values);
+        [&[at][..], &(array.len() as u16).to_le_bytes(), &array].concat()
+    };
+    let rows = samples.iter().zip(&trigger).map(|(y, d)| format!("{y},{d}\n"));
+    vec![
+        archive_of(&[vec![0], field("y", &samples), field("d", &trigger)].concat()),
+        archive_of(&[vec![1], field("y", &samples), field("d", &trigger)].concat()),
+        npy::encode(&[60], &samples),
+        npy::encode(&[20, 3], &samples),
+        format!("y,d\n{}", rows.collect::<String>()).into_bytes(),
+        samples.iter().flat_map(|y| y.to_le_bytes()).collect(),
     ]
 }
 
