@@ -264,7 +264,12 @@ impl WithSimd for Dots<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
-        self.vectors.iter().map(|vector| dot(self.row, vector)).collect()
+        // A closure would be compiled by itself, without the vectors.
+        let mut found = Vec::with_capacity(self.vectors.len());
+        for vector in self.vectors {
+            found.push(dot(self.row, vector));
+        }
+        found
     }
 }
 
