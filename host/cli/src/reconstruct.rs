@@ -53,7 +53,7 @@ pub struct Args {
           "keep_leak", "warm_start"])]
     matrix: Option<PathBuf>,
     /// With --matrix: height and width of the image, such as 12x15, if patterns are rows and the image is no square
-    #[arg(long, value_name = "HEIGHTxWIDTH", requires = "matrix")]
+    #[arg(long, value_name = "HxW", requires = "matrix")]
     size: Option<Size>,
     /// With --matrix: the array of the patterns, in a file of several [default: patterns or matrix, or the only array of two or
     /// three axes]

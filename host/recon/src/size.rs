@@ -14,7 +14,7 @@ pub struct Size {
 
 /// No image has this size, or the text is no size.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("an image of {found} pixels, expected HEIGHTxWIDTH such as 12x15, of 2 to 65536 pixels")]
+#[error("an image of {found} pixels, expected height x width such as 12x15, of 2 to 65536 pixels")]
 pub struct SizeError {
     /// What was asked for.
     pub found: String,

@@ -61,9 +61,9 @@ fn what_is_wrong_with_patterns_of_the_users_own_is_named() {
     write("pairs.npy", &[5, 16], &weights[..80]);
     run("pairs.npy", &[]).failed(1, &["are read with --readings pairs or halves"]);
     write("odd.npy", &[10, 15], &weights[..150]);
-    run("odd.npy", &[]).failed(1, &["odd.npy", "has shape (10, 15)", "--size HEIGHTxWIDTH"]);
+    run("odd.npy", &[]).failed(1, &["odd.npy", "has shape (10, 15)", "--size HxW"]);
     run("odd.npy", &["--size", "4x4"]).failed(1, &["has shape (10, 15)", "(M, 16) or (M, 4, 4)"]);
-    run("odd.npy", &["--size", "4"]).failed(2, &["4 pixels", "HEIGHTxWIDTH such as 12x15"]);
+    run("odd.npy", &["--size", "4"]).failed(2, &["4 pixels", "height x width such as 12x15"]);
     run("odd.npy", &["--size", "3x5", "--basis", "haar", "--method", "omp"])
         .failed(1, &["odd.npy", "haar basis of 3 x 5 images", "expected dct or pixel"]);
     write("flat.npy", &[160], &weights);

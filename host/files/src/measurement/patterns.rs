@@ -138,8 +138,8 @@ impl<'p> PatternArray<'p> {
                         size.height(),
                         size.width()
                     ),
-                    None => "(M, n * n), a pattern a row, or (M, height, width), a picture a pattern; or --size \
-                             HEIGHTxWIDTH for rows of other patterns"
+                    None => "(M, n * n), a pattern a row, or (M, height, width), a picture a pattern; or --size HxW for rows of \
+                             other patterns"
                         .to_owned(),
                 };
                 Err(self.refused(has_shape(&self.axes()), expected))
