@@ -41,7 +41,7 @@ fn bash_offers_files_where_a_file_can_stand() {
     for words in [&["reconstruct", ""][..], &["reconstruct", "my"], &["capture", "--picture", ""]] {
         assert!(offers(words).is_empty(), "{words:?}: {:?}", offers(words));
     }
-    assert_eq!(offers(&["reconstruct", "--matr"]), ["--matrix"]);
+    assert_eq!(offers(&["reconstruct", "--matr"]), ["--matrix", "--matrix-field"]);
     assert!(offers(&["reconstruct", "--method", "t"]).contains(&"tikhonov".to_owned()));
     assert_eq!(offers(&["recons"]), ["reconstruct"]);
     assert!(offers(&["bench", ""]).contains(&"omp".to_owned()));
