@@ -3,7 +3,7 @@
 //! Every function that writes one takes a [`Provenance`], so that none can leave it out. A PNG has it
 //! in text chunks, a picture for people also as a line of text below the image, JSON as the object
 //! `provenance`, an `.npz` file as the field `provenance`, an MCAP file as a metadata record.
-//! `docs/measurements.md` lists where each kind of file has it.
+//! `docs/results.md` lists where each kind of file has it.
 //!
 //! # Invariant
 //! No secret of the command line is written (`tests::secrets_of_the_command_line_are_left_out`).

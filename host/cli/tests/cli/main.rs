@@ -20,6 +20,7 @@ mod ends;
 mod enhance;
 mod everyday;
 mod foreign_devices;
+mod forms;
 mod many;
 mod metrics;
 mod options;

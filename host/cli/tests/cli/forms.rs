@@ -1,0 +1,182 @@
+//! Every row of the table of forms in docs/measurements.md: a file of that form is an image with the row's option.
+
+use crate::bench::{Bench, Measured, correlation, npz};
+use nirspi::files::npy::encode;
+
+/// The heading above the table.
+const HEADING: &str = "## What an option says about a file";
+
+/// A form: the first cell of its row, the bytes of its file by the file's name, and the options.
+struct Form {
+    row: &'static str,
+    file: &'static str,
+    bytes: Vec<u8>,
+    options: Vec<&'static str>,
+}
+
+/// Rows of the table: their two cells.
+fn rows() -> Vec<(String, String)> {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/measurements.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let (_, table) = page.split_once(HEADING).unwrap();
+    let lines = table.lines().skip_while(|line| !line.starts_with('|'));
+    let lines = lines.take_while(|line| line.starts_with('|')).skip(2);
+    let cells = |line: &str| {
+        let (first, second) = line.trim_matches('|').split_once(" | ").unwrap();
+        (first.trim().to_owned(), second.trim().to_owned())
+    };
+    lines.map(cells).collect()
+}
+
+/// Complex readings, as NumPy writes them.
+fn complex(values: &[f32]) -> Vec<u8> {
+    let shape = values.len();
+    let header = format!("{{'descr': '<c8', 'fortran_order': False, 'shape': ({shape},), }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(values.iter().flat_map(|v| [0.6 * v, 0.8 * v]).flat_map(f32::to_le_bytes));
+    bytes
+}
+
+/// A file of each form, of the scene measured with patterns in natural order.
+fn forms(measured: &Measured) -> Vec<Form> {
+    let (n, area) = (measured.n, measured.image.len());
+    let at = |row: usize| measured.h_row.iter().position(|&shown| shown == row as f32).unwrap();
+    let rows: Vec<f32> = (0..area).map(|row| row as f32).collect();
+    let d: Vec<f32> = (0..area).map(|row| measured.d[at(row)]).collect();
+    let y: Vec<f32> =
+        (0..area).flat_map(|row| [measured.y[2 * at(row)], measured.y[2 * at(row) + 1]]).collect();
+    let side = |which: usize| y.iter().copied().skip(which).step_by(2).collect::<Vec<f32>>();
+    let (on, off) = (side(0), side(1));
+    let whole: (&str, &[usize], &[f32]) = ("n", &[], &[n as f32]);
+    let shown: (&str, &[usize], &[f32]) = ("h_row", &[area], &rows);
+    let readings: (&str, &[usize], &[f32]) = ("y", &[2 * area], &y);
+    let turned: Vec<f32> = (0..area).map(|row| ((row % n) * n + row / n) as f32).collect();
+    let other: Vec<f32> = y.iter().rev().copied().collect();
+    let first: Vec<f32> = y.iter().flat_map(|&y| [y, 0.0]).collect();
+    let commas: String = y.iter().map(|y| format!("{y:.4}\n").replace('.', ",")).collect();
+    // Five samples before the first reading; ten of each reading.
+    let samples: Vec<f32> =
+        [0.0; 5].into_iter().chain(y.iter().flat_map(|&y| [y; 10])).chain([0.0; 5]).collect();
+    let trigger: Vec<f32> = (0..samples.len())
+        .map(|at| {
+            f32::from(u8::from((5..5 + 10 * y.len()).contains(&at) && at % 10 < 8 && at % 10 > 4))
+        })
+        .collect();
+    let length = [samples.len()];
+    let trace: [(&str, &[usize], &[f32]); 2] =
+        [("ch1", &length, &samples), ("ch2", &length, &trigger)];
+    let form = |row, file, bytes, options: &[&'static str]| Form {
+        row,
+        file,
+        bytes,
+        options: options.to_vec(),
+    };
+    vec![
+        form(
+            "has many samples of each reading, perhaps with a trigger",
+            "trace.npz",
+            npz(&trace),
+            &["--shown", "natural"],
+        ),
+        form("has no `h_row`", "y.npy", encode(&[2 * area], &y), &["--shown", "natural"]),
+        form("has no `n`", "rows.npz", npz(&[shown, readings]), &["--side", "16"]),
+        form(
+            "calls the readings something else",
+            "volts.npz",
+            npz(&[whole, shown, ("volts", &[2 * area], &y)]),
+            &["--field", "volts"],
+        ),
+        form(
+            "has patterns and complements in two fields or columns",
+            "two.npz",
+            npz(&[whole, shown, ("on", &[area], &on), ("off", &[area], &off)]),
+            &["--field", "on,off"],
+        ),
+        form(
+            "holds all patterns first, then all complements",
+            "halves.npz",
+            npz(&[whole, shown, ("y", &[2 * area], &[&on[..], &off].concat())]),
+            &["--readings", "halves"],
+        ),
+        form(
+            "holds patterns without complements",
+            "single.npz",
+            npz(&[whole, shown, ("y", &[area], &on)]),
+            &["--readings", "single"],
+        ),
+        form(
+            "holds differences under the name `y` or without a name",
+            "d.npy",
+            encode(&[area], &d),
+            &["--readings", "differences", "--shown", "natural"],
+        ),
+        form(
+            "holds several measurements, (..., M)",
+            "several.npz",
+            npz(&[whole, shown, ("y", &[2, 2 * area], &[&other[..], &y].concat())]),
+            &["--index", "1"],
+        ),
+        form(
+            "has the patterns along the first axis, (M, ...)",
+            "first.npz",
+            npz(&[whole, shown, ("y", &[2 * area, 2], &first)]),
+            &["--patterns-first", "--index", "0"],
+        ),
+        form(
+            "numbers pixels down the columns, as MATLAB does",
+            "matlab.npz",
+            npz(&[whole, ("h_row", &[area], &turned), readings]),
+            &["--transpose"],
+        ),
+        form("holds complex readings", "complex.npy", complex(&y), &["--shown", "natural"]),
+        form(
+            "is a text with decimal commas, and the text does not show that",
+            "commas.txt",
+            commas.into_bytes(),
+            &["--decimal-comma", "--shown", "natural"],
+        ),
+        form(
+            "was measured with other patterns",
+            "on.npy",
+            encode(&[area], &on),
+            &["--matrix", "patterns.npy", "--method", "tikhonov"],
+        ),
+    ]
+}
+
+#[test]
+fn every_form_of_the_page_is_an_image_with_its_option() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let area = measured.image.len();
+    let lit = |k: usize, p: usize| f32::from(u8::from((k & p).count_ones() % 2 == 0));
+    let patterns: Vec<f32> = (0..area * area).map(|at| lit(at / area, at % area)).collect();
+    bench.write("patterns.npy", &encode(&[area, 16, 16], &patterns));
+    let (rows, forms) = (rows(), forms(&measured));
+    let titles: Vec<&str> = rows.iter().map(|(form, _)| &**form).collect();
+    assert_eq!(titles, forms.iter().map(|form| form.row).collect::<Vec<_>>());
+    for ((_, says), Form { row, file, bytes, options }) in rows.iter().zip(forms) {
+        let option = says.split('`').find(|part| part.starts_with("--"));
+        let option = option.map(|option| option.split(' ').next().unwrap());
+        let is_said =
+            option.is_none_or(|option| options.contains(&option) || row.contains("complex"));
+        assert!(is_said, "{row}: {says}, tried {options:?}");
+        bench.write(file, &bytes);
+        let mut input = file;
+        if says.contains("nirspi readings") {
+            let cut = ["--field", "ch1", "--trigger", "ch2", "--out", "m.npz"];
+            bench.run(&[&["readings", file], &cut[..]].concat()).succeeded();
+            input = "m.npz";
+        }
+        let out = format!("out-{file}");
+        let mut line = vec!["reconstruct", input, "--out", &out];
+        if !options.contains(&"--method") {
+            line.extend(["--method", "hadamard"]);
+        }
+        line.extend(&options);
+        bench.run(&line).succeeded();
+        let found = correlation(&bench.pixels(&format!("{out}/image.npy")), &measured.image);
+        assert!(found > 0.999, "{row}: {found}");
+    }
+}
