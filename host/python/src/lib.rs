@@ -20,6 +20,7 @@ mod orders;
 mod picture;
 mod reconstruct;
 mod recording;
+mod trace;
 mod work;
 
 use pyo3::prelude::*;
@@ -53,6 +54,8 @@ mod _nirspi {
     use crate::reconstruct::{bases, methods, reconstruct, reconstruct_file, reconstruct_matrix};
     #[pymodule_export]
     use crate::recording::read_recording;
+    #[pymodule_export]
+    use crate::trace::trace;
     #[pymodule_export]
     use crate::work::{devices, panic_for_tests};
 }

@@ -68,7 +68,7 @@ pub(crate) struct Options {
 }
 
 /// A word of a list, or a refusal that names the option.
-fn word<T: FromStr<Err = String>>(option: &str, text: &str) -> PyResult<T> {
+pub(crate) fn word<T: FromStr<Err = String>>(option: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error| refused(format!("{option} is {text:?}, {error}")))
 }
 

@@ -14,7 +14,7 @@ use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
     Reconstruction, Report, Setting, Sparsity, Strength, stack_while,
 };
-use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Side, Size};
+use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Size};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -120,6 +120,30 @@ def test_drop_outs_of_pairs_are_found_and_left_out():
     assert np.isfinite(np.delete(found.d, range(50, 54))).all()
 
 
+def test_a_trace_is_the_measurement_of_its_readings(tmp_path):
+    scene = asymmetric(N)
+    y = of(scene, split=True)
+    samples = np.concatenate([np.zeros(5), np.repeat(y, 6), np.zeros(4)])
+    trigger = np.zeros(len(samples))
+    for start in range(5, 5 + 6 * len(y), 6):
+        trigger[start : start + 3] = 5.0
+    np.savez(tmp_path / "scope.npz", CH1=samples, TRIG=trigger)
+    m = ns.Measurement.from_trace(tmp_path / "scope.npz", trigger="TRIG", settle=2, rows="zig-zag", n=N)
+    assert np.allclose(m.d, of(scene), atol=1e-9)
+    assert "512 readings by the trigger" in m.notes[0]
+    # An edge that is not there is a pattern that was not read.
+    trigger[5 + 6 * 8 : 8 + 6 * 8] = 0.0
+    np.savez(tmp_path / "scope.npz", CH1=samples, TRIG=trigger)
+    with pytest.warns(RuntimeWarning, match="8"):
+        gap = ns.Measurement.from_trace(tmp_path / "scope.npz", trigger="TRIG", rows="zig-zag", n=N)
+    assert len(gap.d) == N * N - 1 and gap.not_read.tolist() == [4]
+    samples.astype("<f4").tofile(tmp_path / "adc.f32")
+    raw = ns.Measurement.from_trace(
+        tmp_path / "adc.f32", raw="f32", samples=6, skip=5, count=512, rows="zig-zag", n=N
+    )
+    assert np.allclose(raw.d, of(scene), atol=1e-3)
+
+
 def test_transposed_pixels_give_the_transposed_image():
     scene = asymmetric(N)
     m = ns.Measurement(d=of(scene.T, "natural"), rows="natural", n=N, transpose=True)

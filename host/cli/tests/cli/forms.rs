@@ -146,6 +146,15 @@ fn forms(measured: &Measured) -> Vec<Form> {
     ]
 }
 
+/// A page that a newcomer reads before the first picture.
+#[test]
+fn the_page_has_at_most_1500_words() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/measurements.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let words = page.split_whitespace().filter(|word| *word != "|").count();
+    assert!(words <= 1500, "{words} words");
+}
+
 #[test]
 fn every_form_of_the_page_is_an_image_with_its_option() {
     let (bench, measured) = (Bench::new(), Measured::new(16));

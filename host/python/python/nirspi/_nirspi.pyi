@@ -40,6 +40,7 @@ __all__ = [
     "scaled",
     "sheet",
     "ssim",
+    "trace",
 ]
 
 _F32 = NDArray[np.float32]
@@ -107,6 +108,7 @@ def reconstruct(
 def reconstruct_file(
     path: str, source: dict[str, Any], options: dict[str, Any]
 ) -> tuple[int, int, _F32, list[tuple[str, int]], list[_I64]] | None: ...
+def trace(path: str, options: dict[str, Any]) -> tuple[_F64, list[str], list[str], str | None]: ...
 def reconstruct_matrix(
     size: tuple[int, int], weights: _F64, y: _F64, options: dict[str, Any]
 ) -> tuple[_F32, list[str]]: ...

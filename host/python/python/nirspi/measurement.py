@@ -200,6 +200,84 @@ class Measurement:
         kept = {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}
         return Measurement(**(kept | changed))
 
+    @classmethod
+    def from_trace(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        rows: Any,
+        n: int,
+        samples: int | None = None,
+        trigger: str | None = None,
+        field: str | None = None,
+        skip: int = 0,
+        settle: int = 0,
+        count: int | None = None,
+        raw: str | None = None,
+        decimal_comma: bool = False,
+        readings: str = "pairs",
+        transpose: bool = False,
+    ) -> Measurement:
+        """The measurement of a trace: samples of a detector that were taken while patterns were shown.
+
+        A reading is the mean of the samples of one pattern, as ``nirspi readings`` makes it. What is
+        not to be trusted is a ``RuntimeWarning``.
+
+        Parameters
+        ----------
+        path : path
+            A file of any format that :func:`load` reads but a recording, or numbers without a heading.
+        rows, n, readings, transpose
+            As of :class:`Measurement`.
+        samples : int, optional
+            Samples of a pattern. With a trigger, its edges must show this number.
+        trigger : str, optional
+            The field with the trigger's samples: a pattern begins where it rises through the middle of
+            its range. One of ``samples`` and ``trigger`` is needed.
+        field : str, optional
+            The field with the detector's samples, of a file with several.
+        skip : int
+            Samples before the first pattern, to leave out.
+        settle : int
+            Samples at the beginning of each pattern to leave out, while the light settles.
+        count : int, optional
+            Readings to keep, for a trace that goes on after the last pattern.
+        raw : {"f32", "f64", "i16"}, optional
+            The kind of the little-endian numbers of a file without a heading.
+        decimal_comma : bool
+            Whether every comma of a text file is a decimal comma.
+
+        Examples
+        --------
+        >>> import numpy as np, os, tempfile
+        >>> import nirspi as ns
+        >>> scene = np.arange(64.0).reshape(8, 8)
+        >>> y = ns.Hadamard(8, split=True)(scene)
+        >>> path = os.path.join(tempfile.mkdtemp(), "adc.f64")
+        >>> np.concatenate([np.zeros(7), np.repeat(y, 5)]).tofile(path)
+        >>> m = ns.Measurement.from_trace(path, raw="f64", samples=5, skip=7, rows="natural", n=8)
+        >>> bool(np.allclose(m.d, ns.Hadamard(8)(scene)))
+        True
+        """
+        if samples is None and trigger is None:
+            raise Error("a trace without samples and trigger, expected one of them")
+        options = {
+            "samples": _arrays.count(samples, "samples", least=1),
+            "trigger": trigger,
+            "skip": _arrays.count(skip, "skip"),
+            "settle": _arrays.count(settle, "settle"),
+            "count": _arrays.count(count, "count", least=1),
+            "field": field,
+            "raw": raw,
+            "decimal_comma": bool(decimal_comma),
+        }
+        y, words, doubts, skipped = _nirspi.trace(os.fspath(path), options)
+        for doubt in doubts:
+            warnings.warn(doubt, RuntimeWarning, stacklevel=2)
+        made = cls(y=y, rows=rows, n=n, readings=readings, transpose=transpose)
+        made.notes = [*words, *([skipped] if skipped else []), *made.notes]
+        return made
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes an ``.npz`` that :func:`load` and ``nirspi reconstruct`` read.
 

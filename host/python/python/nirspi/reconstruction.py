@@ -122,7 +122,8 @@ def reconstruct(
     Returns
     -------
     Image, (..., n, n) of float32
-        With ``matrix``, of any height and width. In the units of the readings. Of complex measurements, the magnitude.
+        In the units of the readings. Of complex measurements, the magnitude. With ``matrix``, of any
+        height and width.
 
     Examples
     --------
@@ -174,22 +175,22 @@ def reconstruct(
         )
     if index is not None and index != "all":
         measurement = measurement[index]
-    n = measurement.n
+    side: int = measurement.n
     options["noise"] = measurement.noise
     if dictionary is not None:
-        options["dictionary"] = _atoms(dictionary, (n, n))
+        options["dictionary"] = _atoms(dictionary, (side, side))
     d = measurement.d
     leading = d.shape[:-1]
     if d.dtype.kind == "c":
-        parts = [_run(n, measurement.rows, part, options) for part in (d.real, d.imag)]
+        parts = [_run(side, measurement.rows, part, options) for part in (d.real, d.imag)]
         pixels = np.hypot(parts[0][0], parts[1][0])
         reports, rows = parts[0][1], parts[0][2]
     else:
-        pixels, reports, rows = _run(n, measurement.rows, d, options)
+        pixels, reports, rows = _run(side, measurement.rows, d, options)
     if measurement.flat_field is not None:
         pixels = measurement.flat_field.correct(pixels)
     return Image(
-        pixels.reshape(*leading, n, n),
+        pixels.reshape(*leading, side, side),
         report=reports if leading else reports[0],
         unit=measurement.unit,
         rows=rows[0] if len(rows) == 1 else rows,
@@ -283,7 +284,7 @@ def _size(weights: np.ndarray, n: Any) -> tuple[int, int]:
         return weights.shape[1], weights.shape[2]
     side = int(weights.shape[1] ** 0.5 + 0.5)
     if side * side != weights.shape[1]:
-        raise Error(f"{found}, expected (M, {side * side}), or n=(height, width) of patterns that are no squares")
+        raise Error(f"{found}, expected (M, {side * side}), or n=(height, width) of other images")
     return side, side
 
 
