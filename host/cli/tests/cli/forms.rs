@@ -159,7 +159,7 @@ fn the_page_has_at_most_1500_words() {
 fn every_form_of_the_page_is_an_image_with_its_option() {
     let (bench, measured) = (Bench::new(), Measured::new(16));
     let area = measured.image.len();
-    let lit = |k: usize, p: usize| f32::from(u8::from((k & p).count_ones() % 2 == 0));
+    let lit = |k: usize, p: usize| f32::from(u8::from((k & p).count_ones().is_multiple_of(2)));
     let patterns: Vec<f32> = (0..area * area).map(|at| lit(at / area, at % area)).collect();
     bench.write("patterns.npy", &encode(&[area, 16, 16], &patterns));
     let (rows, forms) = (rows(), forms(&measured));
