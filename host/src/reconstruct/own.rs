@@ -15,7 +15,7 @@ use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Readings by patterns of a user's own, and what becomes of them.
+/// A request for the image of readings by patterns of a user's own.
 pub struct OwnImage<'r> {
     /// The file of the readings.
     pub input: &'r Path,
@@ -29,7 +29,7 @@ pub struct OwnImage<'r> {
     pub settings: MatrixSettings,
     /// A file of a user's own atoms: images of the size of the patterns.
     pub dictionary: Option<&'r Path>,
-    /// At most so many patterns are used, as a share of the number of pixels.
+    /// The largest number of patterns to use, as a share of the number of pixels.
     pub sampling: Sampling,
     /// Folder for the results.
     pub out: &'r Path,

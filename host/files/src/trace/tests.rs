@@ -2,7 +2,7 @@ use super::*;
 use crate::testing::{Zip, file, line, npy_f64, zip};
 use proptest::prelude::*;
 
-/// A trace of levels, of so many samples each after some others, and its trigger.
+/// A trace with some samples of each level, behind a few samples of no pattern, and its trigger.
 #[derive(Clone)]
 struct Made {
     samples: Vec<f64>,
