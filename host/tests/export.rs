@@ -4,7 +4,7 @@
 
 use nirspi::export::{ExportOptions, Format, export};
 use nirspi::files::measurement::Selection;
-use nirspi::imaging::{Enhance, ImageContext, SPREAD_COPIES, White};
+use nirspi::imaging::{Enhance, ImageContext, KnownReadings, MethodReport, SPREAD_COPIES, White};
 use nirspi::provenance::Made;
 use nirspi::recording::Recording;
 use nirspi::source::{Source, SourceOptions};
@@ -111,9 +111,12 @@ fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
     let whole = Source::read(&recording(), &SourceOptions::default()).unwrap();
     let method = Method::default().prepare(&nirspi_nets::prior::settings()).unwrap();
     let image = method.reconstruct(&whole.measurements).unwrap();
+    let report = MethodReport { method: Method::default(), made: image.report.clone() };
     let image = image.with_readings(&whole.measurements);
-    let rows = Some(whole.measurements.rows());
-    let context = ImageContext { rows, copies: SPREAD_COPIES, ..ImageContext::default() };
+    let settings = nirspi_nets::prior::settings();
+    let readings = KnownReadings::new(&report, &settings, &whole.measurements);
+    let (rows, copies) = (Some(whole.measurements.rows()), SPREAD_COPIES);
+    let context = ImageContext { rows, readings, copies, ..ImageContext::default() };
     let enhance = Enhance::built_in(&Device::cpu()).unwrap();
     let made = enhance.enhance(&image, White::Brightest, &context).unwrap();
     assert_eq!(images(&out, "/enhanced", 64), [made.pixels]);
@@ -121,9 +124,8 @@ fn an_exported_recording_has_enhanced_images_and_their_spread_if_asked() {
     assert!(spread.iter().all(|&spread| (0.0..0.5).contains(&spread)), "a standard deviation");
     assert!(spread.iter().any(|&spread| spread > 0.0));
     assert_eq!(images(&out, "/spread", 64), [spread]);
-    // Nothing is known of the noise of this recording's readings, so there is no interval.
-    assert!(made.half_width.is_none() && images(&out, "/interval", 64).is_empty());
-    assert!(made.no_interval.unwrap().contains("the noise of the readings"));
+    // The spread of the sweeps tells the noise of the readings.
+    assert_eq!(images(&out, "/interval", 64), [made.half_width.unwrap()]);
 }
 
 #[test]

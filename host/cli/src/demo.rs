@@ -185,9 +185,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let truth = optics.focused_footprint()?.weights().to_vec();
     let (raw_quality, quality) = (score(&raw, &truth)?, score(&image, &truth)?);
     let settings = args.method.settings_for(measurements.side().pixels())?;
-    // In shares of the white sheet, as the image.
-    let noise = measurements.noise().map(|counts| counts / f64::from(white));
-    let readings = KnownReadings::new(method.used(), &settings, &measurements, noise);
+    let readings = KnownReadings::new(&method, &settings, &measurements);
+    let readings = readings.map(|readings| readings.in_shares_of(white));
     let rows = measurements.rows();
     let stages = enhance_stages(&for_networks, rows, readings, &optics, seed, &mut times)?;
     if quality.inverted {

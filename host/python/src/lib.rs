@@ -39,7 +39,7 @@ mod _nirspi {
     #[pymodule_export]
     use crate::metrics::{correlation, fit, psnr, scaled, ssim};
     #[pymodule_export]
-    use crate::networks::{deblur, deblur_models, enhance, enhance_readings};
+    use crate::networks::{deblur, deblur_models, enhance, enhance_readings, fingerprints};
     #[pymodule_export]
     use crate::omp::Dictionary;
     #[pymodule_export]

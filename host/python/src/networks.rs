@@ -11,6 +11,8 @@ use nirspi_recon::{Image, Rows};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rayon::prelude::*;
+use std::hash::{DefaultHasher, Hasher};
 use std::num::NonZeroU32;
 
 type Made<'py> = (Bound<'py, PyArray1<f32>>, String);
@@ -138,6 +140,23 @@ pub fn deblur<'py>(
     })?;
     let options = Options { consistency: false, ..options };
     made(py, result, model, 1, &options)
+}
+
+/// A number for each image of n x n pixels, another one as soon as a pixel is another.
+#[pyfunction]
+pub fn fingerprints<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f32>,
+    n: usize,
+) -> PyResult<Bound<'py, PyArray1<u64>>> {
+    let values = slice(&values)?;
+    whole("the images", values.len(), n * n)?;
+    let print = |image: &[f32]| {
+        let mut hasher = DefaultHasher::new();
+        image.iter().for_each(|pixel| hasher.write_u32(pixel.to_bits()));
+        hasher.finish()
+    };
+    Ok(array(py, values.par_chunks_exact(n * n).map(print).collect()))
 }
 
 /// Images in the units of the readings, 32 x 32 or 64 x 64, enlarged and deblurred as by `nirspi reconstruct --enhance`,

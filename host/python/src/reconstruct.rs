@@ -10,6 +10,7 @@ use crate::orders::named;
 use crate::work::{backend, long};
 use nirspi::imaging::MethodReport;
 use nirspi::source::{FirstPatterns, Index, Several};
+use nirspi_nets::{deblur, fusion};
 use nirspi_recon::reconstruct::{
     MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
     Reconstruction, Report, Setting, Sparsity, Strength, stack_while,
@@ -226,11 +227,16 @@ impl Ready {
     }
 }
 
+/// Sides of the images of readings that `enhance` takes.
+const NETWORKS_SIDES: [usize; 2] = [fusion::SIDE, deblur::SIDE];
+
 /// What an image was made of.
 struct Made {
     report: Report,
     used: Rows,
     order: String,
+    /// The pixels that the networks get, where these are others and the networks take this size.
+    for_networks: Option<Vec<f32>>,
 }
 
 impl Made {
@@ -240,7 +246,9 @@ impl Made {
         if !pixels.iter().fold(true, |finite, pixel| finite & pixel.is_finite()) {
             return Err(refused("the readings are too large for an image of 32-bit floats"));
         }
-        Ok(Self { report, used: used.rows().clone(), order })
+        let of_networks = NETWORKS_SIDES.contains(&used.side().pixels());
+        let for_networks = of_networks.then(|| report.with_readings(pixels, used)).flatten();
+        Ok(Self { report, used: used.rows().clone(), order, for_networks })
     }
 
     fn has_report_of(&self, other: &Self) -> bool {
@@ -270,10 +278,22 @@ type Reports = Vec<(String, usize)>;
 struct Account {
     reports: Reports,
     rows: Vec<Rows>,
+    /// The images that the networks get; none where these are the images themselves.
+    for_networks: Vec<f32>,
 }
 
+/// An [`Account`] for Python: reports, rows, pixels for the networks.
+type OfPython<'py> = (Reports, Vec<Bound<'py, PyArray1<i64>>>, Bound<'py, PyArray1<f32>>);
+
 impl Account {
-    fn of(made: Vec<Made>, method: Method) -> PyResult<Self> {
+    fn of(mut made: Vec<Made>, method: Method, pixels: &[f32]) -> PyResult<Self> {
+        let mut for_networks = Vec::new();
+        if made.iter().any(|one| one.for_networks.is_some()) {
+            let each = made.iter_mut().zip(pixels.chunks_exact(pixels.len() / made.len()));
+            for (one, shown) in each {
+                for_networks.extend_from_slice(one.for_networks.take().as_deref().unwrap_or(shown));
+            }
+        }
         // The reports of a simple method are all the same.
         let alike = made.chunk_by(|one, next| next.has_report_of(one));
         let reports = alike.map(|alike| Ok((alike[0].report(method)?, alike.len())));
@@ -282,25 +302,24 @@ impl Account {
         if rows.windows(2).all(|two| two[0] == two[1]) {
             rows.truncate(1);
         }
-        Ok(Self { reports, rows })
+        Ok(Self { reports, rows, for_networks })
     }
 
-    fn into_python(self, py: Python<'_>) -> (Reports, Vec<Bound<'_, PyArray1<i64>>>) {
+    fn into_python(self, py: Python<'_>) -> OfPython<'_> {
         let rows = self.rows.iter().map(|rows| array(py, numbers(rows))).collect();
-        (self.reports, rows)
+        (self.reports, rows, array(py, self.for_networks))
     }
 }
 
-/// The images of frames of differences, their reports, and the rows used: an [`Account`].
+/// The images of frames of differences, and an [`Account`] of them.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple for Python")]
 pub fn reconstruct<'py>(
     py: Python<'py>,
     n: u64,
     shown: PyReadonlyArray1<'py, i64>,
     d: PyReadonlyArray1<'py, f64>,
     options: &Bound<'py, PyDict>,
-) -> PyResult<(Bound<'py, PyArray1<f32>>, Vec<(String, usize)>, Vec<Bound<'py, PyArray1<i64>>>)> {
+) -> PyResult<(Bound<'py, PyArray1<f32>>, OfPython<'py>)> {
     let options: Options<'_> = options.extract()?;
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
@@ -319,32 +338,22 @@ pub fn reconstruct<'py>(
     let account = long(py, |stop| {
         let ready = Ready::new(method, &settings, rows, first, sampling, noise)?;
         let made = ready.images(d, places, warm, stop)?;
-        Account::of(made, method)
+        Account::of(made, method, places)
     })?;
     drop(place);
-    let (reports, rows) = account.into_python(py);
-    Ok((pixels, reports, rows))
+    Ok((pixels, account.into_python(py)))
 }
 
 /// As [`reconstruct`], of all measurements of a file, which are read while they are reconstructed; before them the side
 /// of the images and their number. `None` for a file or options that need all measurements in memory first, and for a
 /// measurement that is refused.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple for Python")]
 pub fn reconstruct_file<'py>(
     py: Python<'py>,
     path: PathBuf,
     source: &Bound<'py, PyDict>,
     options: &Bound<'py, PyDict>,
-) -> PyResult<
-    Option<(
-        usize,
-        usize,
-        Bound<'py, PyArray1<f32>>,
-        Vec<(String, usize)>,
-        Vec<Bound<'py, PyArray1<i64>>>,
-    )>,
-> {
+) -> PyResult<Option<(usize, usize, Bound<'py, PyArray1<f32>>, OfPython<'py>)>> {
     let source = source.extract::<measurement::Options>()?.checked()?;
     let options: Options<'_> = options.extract()?;
     if options.warm_start || source.index != Some(Index::All) {
@@ -374,13 +383,10 @@ pub fn reconstruct_file<'py>(
             false => ready.image(d, place).ok(),
         };
         let made = stack.map_into(places, one).map_err(|error| of_source(error.into()))?;
-        made.map(|made| Account::of(made, method)).transpose()
+        made.map(|made| Account::of(made, method, places)).transpose()
     })?;
     drop(place);
-    Ok(account.map(|account| {
-        let (reports, rows) = account.into_python(py);
-        (side.pixels(), count, pixels, reports, rows)
-    }))
+    Ok(account.map(|account| (side.pixels(), count, pixels, account.into_python(py))))
 }
 
 /// The images of readings by patterns of one's own, and a report of each as JSON.

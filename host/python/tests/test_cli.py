@@ -38,11 +38,11 @@ def test_reconstruct(cli, wing, tmp_path, method, sampling):
     assert section is None or image.report[section] == report[section]
 
 
-def test_reconstruct_and_enhance(cli, wing, tmp_path):
-    # The program gives the networks the readings as they are, as the plain transform does.
-    plain = ["--method", "hadamard", "--sampling", "0.5"]
-    run(cli, "reconstruct", wing, "--enhance", *plain, "--out", tmp_path / "o")
-    sharp = ns.enhance(ns.reconstruct(ns.load(wing), method="hadamard", sampling=0.5))
+@pytest.mark.parametrize("method", ["hadamard", "tikhonov", "auto"])
+def test_reconstruct_and_enhance(cli, wing, tmp_path, method):
+    options = ["--method", method, "--sampling", "0.5"]
+    run(cli, "reconstruct", wing, "--enhance", *options, "--out", tmp_path / "o")
+    sharp = ns.enhance(ns.reconstruct(ns.load(wing), method=method, sampling=0.5))
     assert same(sharp, np.load(tmp_path / "o/enhanced.npy"))
     report = json.loads((tmp_path / "o/report.json").read_text())["enhancement"]
     assert sharp.report["inconsistency"] == pytest.approx(report["inconsistency"])

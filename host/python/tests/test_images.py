@@ -59,3 +59,68 @@ def test_a_plot_has_a_colour_bar(images):
     assert len(axes.figure.axes) == 2
     with pytest.raises(ns.Error, match="expected one image"):
         images.plot()
+
+
+def of_noisy_readings(random, noise=60.0):
+    """Images of three scenes by half of the patterns, and their readings."""
+    H = ns.Hadamard(32, ns.order("sequency", 32)[:512])
+    scenes = 100 * random.random((3, 8, 8)).repeat(4, axis=1).repeat(4, axis=2)
+    d = H(scenes) + noise * random.standard_normal((3, 512))
+    m = ns.Measurement(d=d, rows=H.rows, n=32, noise=noise)
+    return ns.reconstruct(m, method="tikhonov"), m
+
+
+def sharp(image):
+    return np.asarray(ns.enhance(image))
+
+
+def test_networks_get_the_readings_as_they_were_read(random):
+    images, m = of_noisy_readings(random)
+    assert all(report["weight_of_readings"] < 0.95 for report in images.report)
+    H, given = ns.Hadamard(32), images._for_networks()
+    of_given, of_image = H(given.astype(float)), H(np.asarray(images, float))
+    assert np.allclose(of_given[:, m.rows], m.d, atol=0.05)
+    assert np.abs(of_image[:, m.rows] - m.d).max() > 1
+    # Other rows are as the method predicts them.
+    others = np.setdiff1d(np.arange(1024), m.rows)
+    assert np.allclose(of_given[:, others], of_image[:, others], atol=0.05)
+    alone = sharp(images[1])
+    assert (alone == sharp(ns.Image(given[1], rows=images.rows))).all()
+    assert (alone != sharp(ns.Image(np.asarray(images[1]), rows=images.rows))).any()
+
+
+def test_parts_and_copies_of_a_stack_keep_the_readings(random):
+    images, _ = of_noisy_readings(random)
+    given = images._for_networks()
+    again = pickle.loads(pickle.dumps(images))
+    for other in [again, copy.deepcopy(images), images.copy()]:
+        assert (other._for_networks() == given).all()
+    for index in [1, slice(1, 3), slice(None, None, -1), [2, 0], (slice(0, 2), slice(None))]:
+        assert (images[index]._for_networks() == given[index]).all()
+
+
+def test_pixels_that_were_changed_are_those_that_networks_get(random):
+    images, _ = of_noisy_readings(random)
+    given = images._for_networks()
+    images[1, 4, 4] = 0
+    now = images._for_networks()
+    assert (now[[0, 2]] == given[[0, 2]]).all() and (now[1] == np.asarray(images[1])).all()
+
+
+def test_the_flat_field_corrects_what_networks_get(random):
+    class Halved:
+        def correct(self, pixels):
+            return pixels / 2
+
+    plain, m = of_noisy_readings(random)
+    m.flat_field = Halved()
+    images = ns.reconstruct(m, method="tikhonov")
+    assert (images._for_networks() == plain._for_networks() / 2).all()
+    assert (np.asarray(images) == np.asarray(plain) / 2).all()
+
+
+def test_both_parts_of_complex_readings_are_as_read(random):
+    images, m = of_noisy_readings(random)
+    turned = ns.Measurement(d=m.d * np.exp(0.5j), rows=m.rows, n=32, noise=m.noise)
+    given = ns.reconstruct(turned, method="tikhonov")._for_networks()
+    assert np.allclose(given, np.abs(images._for_networks()), rtol=1e-3, atol=0.05)

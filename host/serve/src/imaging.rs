@@ -12,13 +12,16 @@ use super::{Shared, lock};
 use nirspi::calibration::FlatField;
 use nirspi::causes;
 use nirspi::clock::{self, Instant};
-use nirspi::imaging::{Enhance, EnhanceError, SteadyWhite, Warning, White, enhance_frame};
+use nirspi::imaging::{
+    Enhance, EnhanceError, ImageContext, KnownReadings, MethodReport, SteadyWhite, Warning, White,
+    enhance_frame,
+};
 use nirspi::integrate::IntegrateError;
 use nirspi_nets::deblur::Model;
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
 use nirspi_recon::reconstruct::{
-    Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Setting, Stacked,
-    Strength,
+    Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Report, Setting,
+    Stacked, Strength,
 };
 use nirspi_recon::{Measurements, Side};
 use std::sync::{Arc, Mutex};
@@ -83,6 +86,13 @@ pub struct Imaging {
 /// Number of pictures after which a method that chooses among others chooses again: some seconds of a
 /// live view.
 const CHOSEN_EVERY: u32 = 100;
+
+/// These settings with the strength that a page chose; without one, it is chosen by held-back
+/// measurements.
+fn with_strength(settings: &MethodSettings, strength: Option<f64>) -> MethodSettings {
+    let strength = strength.map_or_else(Strength::default, Strength::Fixed);
+    MethodSettings { strength, ..settings.clone() }
+}
 
 /// A method of reconstruction that is ready.
 struct Prepared {
@@ -172,12 +182,25 @@ impl Imaging {
             && method.takes(Setting::Strength)
             && *strength != settings.strength
         {
-            let wanted = settings.strength.map_or_else(Strength::default, Strength::Fixed);
-            let with = MethodSettings { strength: wanted, ..self.settings.clone() };
+            let with = with_strength(&self.settings, settings.strength);
             prepared.method = method.prepare(&with.taken_by(*method))?;
             *strength = settings.strength;
         }
         Ok(prepared.method.as_ref())
+    }
+
+    /// What is known of the readings of an image that this method of the library made: `None` for a
+    /// method of your own.
+    fn known(
+        &self,
+        settings: &Settings,
+        report: &Report,
+        measurements: &Measurements,
+    ) -> Option<KnownReadings> {
+        let of_library = self.methods.iter().find(|prepared| prepared.name == settings.method);
+        let (method, strength) = of_library?.built_in?;
+        let report = MethodReport { method, made: report.clone() };
+        KnownReadings::new(&report, &with_strength(&self.settings, strength), measurements)
     }
 
     /// The learned stages with the network that these settings choose.
@@ -314,6 +337,7 @@ impl Imaging {
             .enhance
             .then(|| FlatField::corrected(flat_field, made.with_readings(&measurements)));
         let Reconstruction { image, report } = made;
+        let known = self.known(settings, &report, &measurements);
         let image = FlatField::corrected(flat_field, image);
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
@@ -329,8 +353,10 @@ impl Imaging {
         if let Some(given) = for_networks.filter(|_| white_counts > 0.0) {
             let started = Instant::now();
             let depth = look.depth.as_ref().map(|depth| &depth.map);
-            let (enhance, rows) = (self.enhance(settings)?, measurements.rows());
-            let (made, doubts) = enhance_frame(enhance, &given, rows, white_counts, depth)?;
+            let (rows, readings) = (Some(measurements.rows()), known);
+            let known = ImageContext { rows, readings, depth, ..ImageContext::default() };
+            let enhance = self.enhance(settings)?;
+            let (made, doubts) = enhance_frame(enhance, &given, white_counts, &known)?;
             short.extend(doubts.iter().map(Warning::short));
             all.extend(doubts.iter().map(Warning::to_string));
             enhancement = Some(Enhancement {

@@ -1,9 +1,34 @@
 //! The enhanced images of an exported recording, and how well their pixels repeat.
 
 use super::{ExportError, ExportOptions, Whole};
-use crate::imaging::{Enhance, EnhancedImage, ImageContext, SPREAD_COPIES, White};
+use crate::calibration::FlatField;
+use crate::imaging::{
+    Enhance, EnhancedImage, ImageContext, KnownReadings, MethodReport, SPREAD_COPIES, White,
+};
 use nirspi_nets::Device;
-use nirspi_recon::Image;
+use nirspi_recon::reconstruct::{Method, Reconstruction};
+use nirspi_recon::{Image, Measurements};
+
+/// What the networks get of an image.
+pub(super) struct ForNetworks {
+    image: Image,
+    readings: Option<KnownReadings>,
+}
+
+impl ForNetworks {
+    /// Of an image that the default method made of these measurements.
+    pub(super) fn of(
+        made: &Reconstruction,
+        measurements: &Measurements,
+        flat_field: Option<&FlatField>,
+    ) -> Self {
+        let report = MethodReport { method: Method::default(), made: made.report.clone() };
+        Self {
+            image: FlatField::corrected(flat_field, made.with_readings(measurements)),
+            readings: KnownReadings::new(&report, &super::settings(), measurements),
+        }
+    }
+}
 
 /// Enhances the images of a recording with one white level, so that a viewer does not show a
 /// flicker.
@@ -22,9 +47,9 @@ impl Enhancing {
     }
 
     /// Takes the white level of an image that will be enhanced.
-    pub(super) fn look_at(&mut self, image: &Image) {
+    pub(super) fn look_at(&mut self, given: &ForNetworks) {
         if self.enhance.is_some() {
-            self.levels.push(White::Brightest.level(image));
+            self.levels.push(White::Brightest.level(&given.image));
         }
     }
 
@@ -33,7 +58,7 @@ impl Enhancing {
         &mut self,
         whole: &Whole,
         time_ns: u64,
-        image: &Image,
+        given: &ForNetworks,
     ) -> Result<Option<EnhancedImage>, ExportError> {
         let Some(enhance) = &self.enhance else { return Ok(None) };
         self.levels.sort_by(f32::total_cmp);
@@ -42,9 +67,10 @@ impl Enhancing {
             return Ok(None);
         }
         let rows = Some(whole.source.measurements.rows());
-        let context = ImageContext { rows, copies: SPREAD_COPIES, ..ImageContext::default() };
+        let (readings, copies) = (given.readings, SPREAD_COPIES);
+        let context = ImageContext { rows, readings, copies, ..ImageContext::default() };
         let path = whole.path.clone();
         let problem = |problem| ExportError::Enhance { path, time_ns, problem };
-        Ok(Some(enhance.enhance(image, White::Known(white), &context).map_err(problem)?))
+        Ok(Some(enhance.enhance(&given.image, White::Known(white), &context).map_err(problem)?))
     }
 }

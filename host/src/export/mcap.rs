@@ -3,6 +3,8 @@
 //! The packets, their times and the information before them are those of the recording, so the
 //! exported file is a recording itself.
 
+#[cfg(feature = "enhance")]
+use super::enhancing::ForNetworks;
 use super::{ExportError, ExportOptions, Whole};
 use crate::files::FileError;
 use crate::files::output::{Existing, write_in_pieces};
@@ -32,11 +34,12 @@ pub(super) fn write(
     let mut enhancing = super::enhancing::Enhancing::new(options)?;
     let mut recording = Recording::open(&whole.path)?;
     each(whole, &mut recording, |what| {
-        if let What::Image(_, image, _given) = what {
+        if let What::Image(_, made) = what {
             images += 1;
             #[cfg(feature = "enhance")]
-            enhancing.look_at(&_given);
-            range = image
+            enhancing.look_at(&made.for_networks);
+            range = made
+                .image
                 .pixels()
                 .iter()
                 .fold(range, |[least, most], &pixel| [least.min(pixel), most.max(pixel)]);
@@ -62,9 +65,10 @@ pub(super) fn write(
                     .packet(heard.time_ns, heard.raw)
                     .and_then(|()| book.heard(heard.time_ns, heard.content, tally))
                     .and_then(|()| depth(&mut book, heard, options)),
-                What::Image(time_ns, image, _given) => {
+                What::Image(time_ns, made) => {
+                    let image = made.image;
                     #[cfg(feature = "enhance")]
-                    if let Some(made) = enhancing.enhance(whole, time_ns, &_given)? {
+                    if let Some(made) = enhancing.enhance(whole, time_ns, &made.for_networks)? {
                         let (spread, width) = (made.spread.as_deref(), made.half_width.as_deref());
                         book.enhanced(
                             time_ns,
@@ -102,8 +106,15 @@ fn depth<W: Write>(
 
 enum What<'p> {
     Packet(&'p Heard<'p>, &'p Tally),
-    /// An image, the same for networks, and the time at which its last frame arrived.
-    Image(u64, Image, Image),
+    /// An image, and the time at which its last frame arrived.
+    Image(u64, Shown),
+}
+
+/// An image of some frames.
+struct Shown {
+    image: Image,
+    #[cfg(feature = "enhance")]
+    for_networks: ForNetworks,
 }
 
 /// Goes through the packets of a recording, and the images of its frames.
@@ -117,14 +128,17 @@ fn each(
     let problem = |frame| move |problem| ExportError::Image { path: path.clone(), frame, problem };
     let method = Method::default().prepare(&super::settings()).map_err(problem(0))?;
     let method = Stacked::new(method);
-    let image = |sum: Integrated, frame: usize| -> Result<[Image; 2], ExportError> {
+    let image = |sum: Integrated, frame: usize| -> Result<Shown, ExportError> {
         let measurements = sum
             .with_noise_of_a_sweep(whole.noise_of_a_sweep)
             .measurements(&setup, settling.as_ref(), whole.keep_leak)
             .map_err(|problem| whole.integrate(problem))?;
         let made = method.reconstruct(&measurements).map_err(problem(frame))?;
-        let given = made.with_readings(&measurements);
-        Ok([made.image, given].map(|image| whole.source.flattened(image)))
+        Ok(Shown {
+            #[cfg(feature = "enhance")]
+            for_networks: ForNetworks::of(&made, &measurements, whole.source.flat_field.as_ref()),
+            image: whole.source.flattened(made.image),
+        })
     };
     let mut sum = Integrated::new(&setup);
     // The image that is being summed: its number, and the time of its newest frame.
@@ -138,8 +152,7 @@ fn each(
                 && before != number
             {
                 let summed = std::mem::replace(&mut sum, Integrated::new(&setup));
-                let [shown, given] = image(summed, frames)?;
-                on(What::Image(time_ns, shown, given))?;
+                on(What::Image(time_ns, image(summed, frames)?))?;
             }
             sum.add(frame);
             open = Some((number, heard.time_ns));
@@ -148,10 +161,7 @@ fn each(
         on(What::Packet(heard, tally))
     })?;
     match open {
-        Some((_, time_ns)) => {
-            let [shown, given] = image(sum, frames)?;
-            on(What::Image(time_ns, shown, given))
-        }
+        Some((_, time_ns)) => on(What::Image(time_ns, image(sum, frames)?)),
         None => Ok(()),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Enhance, EnhanceError, EnhancedImage, ImageContext, Warning, White, warnings};
 use crate::stage_times::StageTimes;
-use nirspi_nets::{DepthMaps, Device, WeightsError};
+use nirspi_nets::{Device, WeightsError};
 use nirspi_recon::{Image, Rows};
 use serde::Serialize;
 use thiserror::Error;
@@ -70,22 +70,19 @@ pub enum FramesError {
     Enhance(#[from] EnhanceError),
 }
 
-/// Enhances the image of a frame that was made from these Hadamard rows, and says whether the result
-/// can be trusted. `white` is the level of a white target in the image's units, and `depth` are
-/// distances at the same time, if a sensor gave some. Every command that enhances a camera's frames
-/// calls this function.
+/// Enhances the image of a frame, and says whether the result can be trusted. `white` is the level of
+/// a white target in the image's units; `known` says of which Hadamard rows the image was made, how
+/// these were read, and which distances a sensor gave at the same time.
 ///
 /// # Errors
 /// As [`Enhance::enhance`].
 pub fn enhance_frame(
     enhance: &Enhance,
     image: &Image,
-    rows: &Rows,
     white: f32,
-    depth: Option<&DepthMaps>,
+    known: &ImageContext<'_>,
 ) -> Result<(EnhancedImage, Vec<Warning>), EnhanceError> {
-    let known = ImageContext { rows: Some(rows), depth, ..ImageContext::default() };
-    let made = enhance.enhance(image, White::Known(white), &known)?;
+    let made = enhance.enhance(image, White::Known(white), known)?;
     let doubts = warnings(&made);
     Ok((made, doubts))
 }

@@ -124,7 +124,7 @@ impl Server {
     }
 }
 
-fn shows_enhanced(state: &Value) -> bool {
+pub fn shows_enhanced(state: &Value) -> bool {
     state["picture"]["enhancement"].is_object()
 }
 
@@ -179,6 +179,16 @@ fn a_browser_gets_the_page_and_a_script_the_images_of_the_scene() {
     assert!(likeness > 0.9, "{likeness}");
     let likeness = correlation(&server.image(&bench, "/enhanced.png"), &optics.focused(64));
     assert!(likeness > 0.95, "{likeness}");
+    // The sweeps tell the noise of the readings, and with it each pixel's interval.
+    assert_eq!(interval(&server), Some(64 * 64));
+}
+
+/// Number of pixels with an interval in the next enhanced image; `None` without intervals.
+#[track_caller]
+pub fn interval(server: &Server) -> Option<usize> {
+    let mut moments = server.browser();
+    let moment = moments.find(|moment| shows_enhanced(&moment["state"])).unwrap();
+    moment["interval"].as_str().map(|numbers| numbers.trim_end_matches('=').len() * 3 / 4 / 4)
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `nirspi serve`: what the page changes while the camera runs.
 
 use crate::bench::{Bench, correlation};
-use crate::serve::serve;
+use crate::serve::{interval, serve};
 use nirspi::recording::{Recording, tally_recording};
 use serde_json::{Value, json};
 
@@ -51,6 +51,8 @@ fn a_page_changes_order_sampling_sweeps_strength_and_network_while_the_camera_ru
     let state = server.state("shown so", |state| state["images"]["shown"].as_u64() > before);
     assert_eq!(state["settings"]["strength"], 3.0);
     assert!(state["problem"].is_null(), "{state}");
+    // Intervals are calibrated for the strength that the method chooses.
+    assert_eq!(interval(&server), None);
 
     let models = state["offered"]["models"].as_array().unwrap().clone();
     assert!(models.contains(&json!("diffusion")), "{models:?}");

@@ -23,6 +23,7 @@ __all__ = [
     "devices",
     "enhance",
     "enhance_readings",
+    "fingerprints",
     "fit",
     "load",
     "methods",
@@ -47,6 +48,9 @@ _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]
 _I32 = NDArray[np.int32]
 _I64 = NDArray[np.int64]
+_U64 = NDArray[np.uint64]
+# Reports with the number of images in a row that each is of; rows; pixels for the networks.
+_Account = tuple[list[tuple[str, int]], list[_I64], _F32]
 
 class Error(ValueError): ...
 
@@ -104,10 +108,11 @@ def readings(
 ) -> tuple[_I64, _F64, list[tuple[int, int, list[int]]], list[str]]: ...
 def reconstruct(
     n: int, shown: _I64, d: _F64, options: dict[str, Any]
-) -> tuple[_F32, list[tuple[str, int]], list[_I64]]: ...
+) -> tuple[_F32, _Account]: ...
 def reconstruct_file(
     path: str, source: dict[str, Any], options: dict[str, Any]
-) -> tuple[int, int, _F32, list[tuple[str, int]], list[_I64]] | None: ...
+) -> tuple[int, int, _F32, _Account] | None: ...
+def fingerprints(values: _F32, n: int) -> _U64: ...
 def trace(path: str, options: dict[str, Any]) -> tuple[_F64, list[str], list[str], str | None]: ...
 def reconstruct_matrix(
     size: tuple[int, int], weights: _F64, y: _F64, options: dict[str, Any]

@@ -11,6 +11,11 @@ from . import _nirspi
 UNITS = ("units of the readings", "ADC counts", "of white", "reflectance")
 
 
+def _prints(images: np.ndarray) -> np.ndarray:
+    """A fingerprint of each image of a stack."""
+    return _nirspi.fingerprints(np.ascontiguousarray(images, np.float32).reshape(-1), images.shape[-1])
+
+
 class Image(np.ndarray):
     """A float32 array ``(n, n)``, or a stack ``(..., n, n)``, that knows how it was made.
 
@@ -44,6 +49,8 @@ class Image(np.ndarray):
     unit: str
     rows: Any
     warnings: list[str]
+    # What the networks get of each image: fingerprints of the images as shown, and other pixels.
+    _networks: tuple[np.ndarray, np.ndarray] | None = None
 
     def __new__(
         cls,
@@ -64,6 +71,26 @@ class Image(np.ndarray):
         self.unit = getattr(source, "unit", UNITS[0])
         self.rows = getattr(source, "rows", None)
         self.warnings = getattr(source, "warnings", [])
+        self._networks = getattr(source, "_networks", None)
+
+    def _for(self, pixels: np.ndarray) -> Image:
+        """Keeps the pixels that the networks get in place of these; none if they get these."""
+        if pixels.size:
+            self._networks = (_prints(self), pixels.reshape(-1, *self.shape[-2:]))
+        return self
+
+    def _for_networks(self) -> np.ndarray:
+        """The images as the networks were trained for: measured patterns as they were read, noise and
+        all. An image whose pixels were changed since stays as it is."""
+        images = np.array(self, dtype=np.float32)
+        if self._networks is not None:
+            prints, given = self._networks
+            known = {print_: k for k, print_ in enumerate(prints.tolist())}
+            each = images.reshape(-1, *images.shape[-2:])
+            for image, print_ in zip(each, _prints(self).tolist(), strict=True):
+                if print_ in known:
+                    image[...] = given[known[print_]]
+        return images
 
     def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
         plain = np.asarray(array)
@@ -87,11 +114,12 @@ class Image(np.ndarray):
 
     def __reduce__(self) -> Any:
         make, arguments, state = tuple(super().__reduce__())
-        return make, arguments, (state, (self.report, self.unit, self.rows, self.warnings))
+        kept = (self.report, self.unit, self.rows, self.warnings, self._networks)
+        return make, arguments, (state, kept)
 
     def __setstate__(self, state: Any) -> None:
         super().__setstate__(state[0])
-        self.report, self.unit, self.rows, self.warnings = state[1]
+        self.report, self.unit, self.rows, self.warnings, self._networks = state[1]
 
     def facts(self) -> str:
         """One line about how the image was made."""

@@ -34,7 +34,8 @@ def enhance(
 ) -> Image:
     """Enlarges and deblurs images, to 64 x 64 in [0, 1]. The networks were trained on characters.
 
-    An :class:`Image` in the units of readings is scaled as by ``nirspi reconstruct --enhance``: the
+    An :class:`Image` in the units of readings is enhanced as by ``nirspi reconstruct --enhance``: the
+    networks get the measured patterns as they were read, unless you changed the pixels, and the
     mean of the brightest 2 x 2 pixels counts as white, of several images the median of these means;
     other options than the image must then keep their defaults. Any other array must be in [0, 1], as
     for ``nirspi enhance``.
@@ -81,7 +82,8 @@ def enhance(
         lists = rows if isinstance(rows, list) else [rows]
         if any(one is None for one in lists):
             lists = [_nirspi.order("natural", n)]
-        pixels, texts = _nirspi.enhance_readings(n, values.reshape(-1), list(lists))
+        given = image._for_networks()
+        pixels, texts = _nirspi.enhance_readings(n, given.reshape(-1), list(lists))
         reports = [json.loads(text) for text in texts]
         warnings = [warning for report in reports for warning in report["warnings"]]
         return Image(

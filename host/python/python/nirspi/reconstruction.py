@@ -184,17 +184,23 @@ def reconstruct(
     if d.dtype.kind == "c":
         parts = [_run(side, measurement.rows, part, options) for part in (d.real, d.imag)]
         pixels = np.hypot(parts[0][0], parts[1][0])
-        reports, rows = parts[0][1], parts[0][2]
+        _, (reports, rows, _) = parts[0]
+        # A part without pixels for the networks gives them its image.
+        given = [given if given.size else shown for shown, (_, _, given) in parts]
+        for_networks = np.hypot(*given)
     else:
-        pixels, reports, rows = _run(side, measurement.rows, d, options)
+        pixels, (reports, rows, for_networks) = _run(side, measurement.rows, d, options)
     if measurement.flat_field is not None:
         pixels = measurement.flat_field.correct(pixels)
-    return Image(
+        if for_networks.size:
+            for_networks = measurement.flat_field.correct(for_networks)
+    image = Image(
         pixels.reshape(*leading, side, side),
         report=reports if leading else reports[0],
         unit=measurement.unit,
         rows=rows[0] if len(rows) == 1 else rows,
     )
+    return image._for(for_networks)
 
 
 def method_options(
@@ -235,11 +241,11 @@ def method_options(
 
 def _run(
     n: int, rows: np.ndarray, d: np.ndarray, options: dict[str, Any]
-) -> tuple[np.ndarray, list[Any], list[np.ndarray]]:
-    pixels, reports, used = _nirspi.reconstruct(
+) -> tuple[np.ndarray, tuple[list[Any], list[np.ndarray], np.ndarray]]:
+    pixels, (reports, used, for_networks) = _nirspi.reconstruct(
         n, rows, np.ascontiguousarray(d, np.float64).reshape(-1), options
     )
-    return pixels, _each(reports), used
+    return pixels, (_each(reports), used, for_networks)
 
 
 def _each(reports: list[tuple[str, int]]) -> list[Any]:
@@ -256,8 +262,11 @@ def _while_reading(path: Any, source: dict[str, Any], options: dict[str, Any]) -
     made = _nirspi.reconstruct_file(os.fspath(path), source_options(index="all", **source), options)
     if made is None:
         return None
-    n, count, pixels, reports, rows = made
-    return Image(pixels.reshape(count, n, n), report=_each(reports), rows=rows[0] if len(rows) == 1 else rows)
+    n, count, pixels, (reports, rows, for_networks) = made
+    image = Image(
+        pixels.reshape(count, n, n), report=_each(reports), rows=rows[0] if len(rows) == 1 else rows
+    )
+    return image._for(for_networks)
 
 
 def _atoms(dictionary: Any, size: tuple[int, int]) -> np.ndarray:

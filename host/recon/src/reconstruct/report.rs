@@ -20,19 +20,10 @@ impl Reconstruction {
     /// a method without weights, stay as they are.
     #[must_use]
     pub fn with_readings(&self, measurements: &Measurements) -> Image {
-        let weighted = self.report.reading_weight.is_some_and(|weight| weight < 1.0);
-        if self.report.warm || !weighted || self.image.side() != measurements.side() {
-            return self.image.clone();
+        match self.report.with_readings(self.image.pixels(), measurements) {
+            Some(pixels) => Image::new(self.image.side(), pixels),
+            None => self.image.clone(),
         }
-        let mut rows: Vec<f64> = self.image.pixels().iter().map(|&pixel| pixel.into()).collect();
-        let area = rows.len() as f64;
-        fwht::transform(&mut rows);
-        for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
-            rows[row as usize] = value;
-        }
-        fwht::transform(&mut rows);
-        let pixels = rows.into_iter().map(|value| (value / area) as f32).collect();
-        Image::new(self.image.side(), pixels)
     }
 }
 
@@ -98,6 +89,24 @@ impl Report {
             warm: false,
             note: None,
         }
+    }
+
+    /// The pixels of the image of this report with its measured rows as they were read
+    /// ([`Reconstruction::with_readings`]); `None` where that is the image itself.
+    #[must_use]
+    pub fn with_readings(&self, pixels: &[f32], measurements: &Measurements) -> Option<Vec<f32>> {
+        let weighted = self.reading_weight.is_some_and(|weight| weight < 1.0);
+        if self.warm || !weighted || pixels.len() != measurements.side().area() {
+            return None;
+        }
+        let mut rows: Vec<f64> = pixels.iter().map(|&pixel| pixel.into()).collect();
+        let area = rows.len() as f64;
+        fwht::transform(&mut rows);
+        for (&row, &value) in measurements.rows().iter().zip(measurements.values()) {
+            rows[row as usize] = value;
+        }
+        fwht::transform(&mut rows);
+        Some(rows.into_iter().map(|value| (value / area) as f32).collect())
     }
 
     /// The report in a few words, for a caption.
