@@ -58,10 +58,8 @@ use std::sync::LazyLock;
 
 /// The features of this program, and whether this build has each one.
 const FEATURES: &[(&str, bool)] = &[
-    ("baselines", cfg!(feature = "baselines")),
     ("flash", cfg!(feature = "flash")),
     ("gpu", cfg!(feature = "gpu")),
-    ("hdf5", cfg!(feature = "hdf5")),
     ("wgpu", cfg!(feature = "wgpu")),
 ];
 

@@ -38,7 +38,7 @@ mod readme;
 mod real_data;
 mod reconstruct;
 // The page is of a build with the default features.
-#[cfg(all(feature = "gpu", feature = "hdf5", not(feature = "flash")))]
+#[cfg(all(feature = "gpu", not(feature = "flash")))]
 mod reference;
 mod selftest;
 #[cfg(unix)]
