@@ -87,7 +87,7 @@ impl Row {
     /// Whether the method knows nothing but the measurements and a formula.
     #[must_use]
     pub fn is_classical(&self) -> bool {
-        self.method != Method::PRIOR.argument()
+        ![Method::PRIOR, Method::AUTO].map(|method| method.argument()).contains(&self.method)
     }
 }
 
@@ -196,7 +196,7 @@ mod tests {
         let parts = [part(0.2), part(0.4)];
         let rows = compare(&[scene()], &parts, &methods, || calls += 1).unwrap();
         assert_eq!((rows.len(), calls), (2 * methods.len(), 2));
-        assert_eq!(rows.iter().filter(|row| !row.is_classical()).count(), 2);
+        assert_eq!(rows.iter().filter(|row| !row.is_classical()).count(), 4);
         assert!(rows.iter().all(|row| row.each_db.len() == 1 && row.psnr_db > 20.0));
         let error = compare(&[], &parts, &methods, || ()).unwrap_err().to_string();
         assert_eq!(error, "no scene, expected at least one");

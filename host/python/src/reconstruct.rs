@@ -282,15 +282,18 @@ struct Account {
     for_networks: Vec<f32>,
 }
 
+/// Images one after another.
+type Pixels<'py> = Bound<'py, PyArray1<f32>>;
+
 /// An [`Account`] for Python: reports, rows, pixels for the networks.
-type OfPython<'py> = (Reports, Vec<Bound<'py, PyArray1<i64>>>, Bound<'py, PyArray1<f32>>);
+type OfPython<'py> = (Reports, Vec<Bound<'py, PyArray1<i64>>>, Pixels<'py>);
 
 impl Account {
     fn of(mut made: Vec<Made>, method: Method, pixels: &[f32]) -> PyResult<Self> {
         let mut for_networks = Vec::new();
         if made.iter().any(|one| one.for_networks.is_some()) {
-            let each = made.iter_mut().zip(pixels.chunks_exact(pixels.len() / made.len()));
-            for (one, shown) in each {
+            let area = pixels.len() / made.len();
+            for (one, shown) in made.iter_mut().zip(pixels.chunks_exact(area)) {
                 for_networks.extend_from_slice(one.for_networks.take().as_deref().unwrap_or(shown));
             }
         }
@@ -319,7 +322,7 @@ pub fn reconstruct<'py>(
     shown: PyReadonlyArray1<'py, i64>,
     d: PyReadonlyArray1<'py, f64>,
     options: &Bound<'py, PyDict>,
-) -> PyResult<(Bound<'py, PyArray1<f32>>, OfPython<'py>)> {
+) -> PyResult<(Pixels<'py>, OfPython<'py>)> {
     let options: Options<'_> = options.extract()?;
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
@@ -353,7 +356,7 @@ pub fn reconstruct_file<'py>(
     path: PathBuf,
     source: &Bound<'py, PyDict>,
     options: &Bound<'py, PyDict>,
-) -> PyResult<Option<(usize, usize, Bound<'py, PyArray1<f32>>, OfPython<'py>)>> {
+) -> PyResult<Option<(usize, usize, Pixels<'py>, OfPython<'py>)>> {
     let source = source.extract::<measurement::Options>()?.checked()?;
     let options: Options<'_> = options.extract()?;
     if options.warm_start || source.index != Some(Index::All) {
