@@ -76,7 +76,7 @@ def sharp(image):
 
 def test_networks_get_the_readings_as_they_were_read(random):
     images, m = of_noisy_readings(random)
-    assert all(report["weight_of_readings"] < 0.95 for report in images.report)
+    assert all(report["penalty"]["weight_of_readings"] < 0.95 for report in images.report)
     H, given = ns.Hadamard(32), images._for_networks()
     of_given, of_image = H(given.astype(float)), H(np.asarray(images, float))
     assert np.allclose(of_given[:, m.rows], m.d, atol=0.05)

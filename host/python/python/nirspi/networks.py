@@ -82,8 +82,8 @@ def enhance(
         lists = rows if isinstance(rows, list) else [rows]
         if any(one is None for one in lists):
             lists = [_nirspi.order("natural", n)]
-        given = image._for_networks()
-        pixels, texts = _nirspi.enhance_readings(n, given.reshape(-1), list(lists))
+        for_networks = image._for_networks().reshape(-1)
+        pixels, texts = _nirspi.enhance_readings(n, for_networks, list(lists))
         reports = [json.loads(text) for text in texts]
         warnings = [warning for report in reports for warning in report["warnings"]]
         return Image(
