@@ -3,7 +3,8 @@
 //!
 //! # Invariant
 //! `received + lost + corrupt + late` is the number of frames made up to the newest frame
-//! ([`LossAccount::accounted`]) (`tests::every_frame_made_is_counted_exactly_once`). After the
+//! ([`LossAccount::accounted`]) (`tests::every_frame_made_is_counted_exactly_once`), from the first frame of
+//! the account on ([`LossAccount::first`]). After the
 //! camera has reported how many frames it made, the sum is the number of all frames
 //! (`tests::frames_missing_at_the_end_show_once_the_camera_says_how_many_it_made`).
 //!
@@ -174,6 +175,8 @@ impl std::fmt::Display for FailedChecks {
 /// Accounts for the frames of one run.
 #[derive(Debug, Clone, Default)]
 pub struct LossAccount {
+    /// Number of the first frame in the account.
+    first: u64,
     counters: LossCounters,
     /// Number of the next frame in order. The wire carries its lower 32 bits.
     expected: u64,
@@ -190,6 +193,12 @@ impl LossAccount {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The account of the frames of a run from this number on. Earlier frames do not count.
+    #[must_use]
+    pub fn beginning_at(first: u64) -> Self {
+        Self { first, expected: first, ..Self::default() }
     }
 
     /// The full number of a frame from its lower 32 bits: the number closest to the next in order.
@@ -268,7 +277,14 @@ impl LossAccount {
         self.counters
     }
 
-    /// Number of frames in the account: sequence numbers from 0 to one less than this number.
+    /// Number of the first frame in the account: 0 for a whole run.
+    #[must_use]
+    pub fn first(&self) -> u64 {
+        self.first
+    }
+
+    /// Number of the next frame in order. The account has the frames from the first one to the one
+    /// before this number; the account of a whole run has so many frames.
     #[must_use]
     pub fn accounted(&self) -> u64 {
         self.expected
@@ -360,6 +376,23 @@ mod tests {
         }
         assert_eq!(account.frame(1), Arrival::Late);
         assert_eq!(account.counters(), LossCounters { received: 4, late: 1, ..Default::default() });
+    }
+
+    /// The second half of a run, of which the first half is in another file.
+    #[test]
+    fn an_account_from_a_later_frame_on_counts_the_frames_after_it() {
+        let mut account = LossAccount::beginning_at(5000);
+        assert_eq!(
+            (account.first(), account.accounted(), account.counters().total()),
+            (5000, 5000, 0)
+        );
+        assert_eq!(account.frame(5001), Arrival::Received);
+        assert_eq!(account.frame(4999), Arrival::Repeated);
+        account.made(5003);
+        let expected = LossCounters { received: 1, lost: 2, corrupt: 0, late: 0 };
+        assert_eq!((account.counters(), account.accounted()), (expected, 5003));
+        let mut long = LossAccount::beginning_at(u64::from(u32::MAX) + 2);
+        assert_eq!(long.frame(1), Arrival::Received);
     }
 
     #[test]

@@ -36,6 +36,9 @@ pub struct Recorded {
     pub setup: MeasurementSetup,
     /// The settling of the camera, if the recording holds it.
     pub settling: Option<Settling>,
+    /// Number of the recording's first frame in its run: 0, unless an earlier file of the run has the
+    /// frames before.
+    pub first_frame: u64,
 }
 
 /// Receives every packet of a session.

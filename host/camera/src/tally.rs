@@ -73,6 +73,13 @@ impl Tally {
         }
     }
 
+    /// The same tally before its first packet, of the frames from this number on. Earlier frames of
+    /// the run do not count.
+    #[must_use]
+    pub fn beginning_at(self, first_frame: u64) -> Self {
+        Self { account: LossAccount::beginning_at(first_frame), ..self }
+    }
+
     /// Counts a packet. Returns whether the packet was a frame that was added to the sum.
     pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
         match content {
@@ -132,8 +139,8 @@ impl Tally {
         self.said = Some(frames_made);
     }
 
-    /// Number of frames that the camera reported, after the end of the run. The camera counts in 32
-    /// bits; the account counts further.
+    /// Number of frames of the whole run that the camera reported, after the end of the run. The
+    /// camera counts in 32 bits; the account counts further.
     #[must_use]
     pub fn made(&self) -> Option<u64> {
         let accounted = self.account.accounted();
@@ -155,7 +162,8 @@ impl Tally {
     /// Whether any packet of the run, whole or damaged, has arrived.
     #[must_use]
     pub fn has_begun(&self) -> bool {
-        self.account.accounted() > 0 || self.account.failed_checks().packets() > 0
+        self.account.accounted() > self.account.first()
+            || self.account.failed_checks().packets() > 0
     }
 
     /// The camera's time of the newest frame.

@@ -12,7 +12,7 @@ use nirspi::exposure::Light;
 use nirspi::files::interrupt;
 use nirspi::files::output::refuse_dash;
 use nirspi::picture::half_blocks;
-use nirspi::recording::Target;
+use nirspi::recording::{Split, Target};
 use nirspi_recon::words::count;
 use nirspi_recon::{Image, Sampling};
 use std::ops::ControlFlow;
@@ -58,6 +58,15 @@ pub struct Args {
     /// NAME.new.mcap in the same folder
     #[arg(long)]
     overwrite: bool,
+    /// Record into several files, NAME-0001.mcap, NAME-0002.mcap, ..., none of which may exist: the next file begins before a
+    /// file is larger than a size (500MB, 2GB) or when its time is over (90s, 10min, 1h). Each file is a whole recording
+    #[arg(
+        long,
+        value_name = "SIZE|TIME",
+        conflicts_with = "overwrite",
+        allow_hyphen_values = true
+    )]
+    split: Option<Split>,
     /// After the recording, make one image of its frames, enlarge and deblur it, and write both into this folder, as
     /// `nirspi reconstruct --enhance` does
     #[arg(long, value_name = "DIR")]
@@ -119,7 +128,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let captured = captured?;
     let path = captured.recording.as_deref().unwrap_or(Path::new(""));
-    let report = CaptureReport::new(session.identity(), path, &choice, &captured)?;
+    let report = CaptureReport::new(session.identity(), &choice, &captured)?;
     let code = say(args, &report)?;
     if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
         let warnings =
@@ -145,20 +154,38 @@ fn seconds(text: &str) -> Result<Duration, String> {
 /// Where to record. A name that is taken is refused before the camera is asked for anything.
 fn target(args: &Args) -> Result<Target> {
     args.out.as_deref().map_or(Ok(()), refuse_dash)?;
-    Ok(match &args.out {
-        Some(path) if args.overwrite => Target::Replace(path.clone()),
-        Some(path) if path.exists() => {
-            let path = path.display();
-            let advice = "choose another name or add --overwrite";
-            return Err(Usage(format!("--out {path} is there already: {advice}")).into());
+    let target = match (&args.out, args.split) {
+        (Some(path), Some(split)) => Target::Parts(path.clone(), split),
+        (None, Some(split)) => Target::FirstFreeParts(PathBuf::new(), split),
+        (Some(path), None) if args.overwrite => Target::Replace(path.clone()),
+        (Some(path), None) => Target::New(path.clone()),
+        (None, None) => Target::FirstFree(PathBuf::new()),
+    };
+    match target.taken() {
+        None => Ok(target),
+        Some(taken) => {
+            let or = if args.split.is_some() { "" } else { " or add --overwrite" };
+            let taken = taken.display();
+            let problem = format!("--out {taken} is there already: choose another name{or}");
+            Err(Usage(problem).into())
         }
-        Some(path) => Target::New(path.clone()),
-        None => Target::FirstFree(PathBuf::new()),
-    })
+    }
+}
+
+/// The files of a recording, as `rec.mcap` or `rec-0001.mcap to rec-0003.mcap`.
+fn names(files: &[PathBuf]) -> String {
+    match files {
+        [] => String::new(),
+        [file] => file.display().to_string(),
+        [first, .., last] => {
+            let name = Path::new(last.file_name().unwrap_or_default()).display();
+            format!("{} to {name} ({} files)", first.display(), files.len())
+        }
+    }
 }
 
 fn say(args: &Args, report: &CaptureReport<'_>) -> Result<ExitCode> {
-    let (frames, path) = (report.frames, report.recording.display());
+    let (frames, path) = (report.frames, names(report.files));
     args.report.print(report, &provenance::of_camera(report.camera), |report| {
         if let Some(note) = report.calibration_note {
             print::note(note)?;

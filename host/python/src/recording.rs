@@ -41,7 +41,7 @@ pub fn read_recording<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let (recording, found, happened, tally) = long(py, |stop| {
         let mut recording = Recording::open(&path).map_err(of_recording)?;
-        let mut tally = Tally::new(&recording.setup, recording.run);
+        let mut tally = recording.tally();
         let (mut found, mut happened) = (Frames::default(), Vec::new());
         for packet in &mut recording {
             if stop.load(Ordering::Relaxed) {

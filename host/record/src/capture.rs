@@ -10,6 +10,7 @@
 //! (`missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). The frames that a camera
 //! delivers limit what this program writes (`junk::tests`).
 
+mod files;
 mod flat_field;
 mod frames_due;
 mod junk;
@@ -190,9 +191,11 @@ pub struct Capture {
     pub asked: Option<u32>,
     /// Frames that the camera reports to have made; `None` if the camera could not report.
     pub made: Option<u64>,
-    /// The recording, if there is one. An incomplete recording that should replace another file has
-    /// a different name than requested.
+    /// The recording, if there is one: the first file of several. An incomplete recording that should
+    /// replace another file has a different name than requested.
     pub recording: Option<PathBuf>,
+    /// The files of the recording in their order.
+    pub files: Vec<PathBuf>,
     /// What ended the capture.
     pub ended: Ended,
     /// Time from start to end of the run.
@@ -225,7 +228,7 @@ pub enum CaptureError {
     },
     /// The recording cannot be continued, because the disk is full or gone.
     #[error(
-        "{path}: cannot record any more, {held} of the {} frames received are whole in the file and kept",
+        "{path}: cannot record any more, {held} of the {} frames received are whole on the disk and kept",
         .captured.counters.received
     )]
     RecordingCut {
@@ -233,7 +236,7 @@ pub enum CaptureError {
         path: PathBuf,
         /// Why.
         source: io::Error,
-        /// Number of frames in the file, counted by reading the file again.
+        /// Number of frames in the files of the run, counted by reading them again.
         held: u64,
         /// The run. Its last frames are not in the file.
         captured: Box<Capture>,

@@ -53,7 +53,8 @@ pub(super) fn write(
         let (settling, run) = (recording.settling.clone(), recording.run);
         let settling = settling.as_ref();
         let (identity, setup, provenance) = (&identity, &setup, Some(provenance));
-        let opening = Opening { identity, setup, settling, run, provenance };
+        let part = recording.part.clone();
+        let opening = Opening { identity, setup, settling, run, part: part.as_ref(), provenance };
         let mut book = Book::begin(file, &opening).map_err(io_error)?;
         if let Some(model) = &options.model {
             let time = whole.time_ns.first().map_or(0, |&time| time as u64);

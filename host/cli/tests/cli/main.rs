@@ -15,6 +15,7 @@ mod capture_tcp;
 mod demo;
 mod dishonest_cameras;
 mod doors;
+mod effects;
 #[cfg(unix)]
 mod ends;
 mod enhance;
@@ -49,6 +50,7 @@ mod serve_guarded;
 mod serve_proxied;
 mod settings;
 mod sparse_problems;
+mod split;
 mod traces;
 mod update;
 mod versions;

@@ -1,7 +1,8 @@
 //! Says in words what a capture lacks.
 
 use super::{Capture, Ended, StopCause};
-use nirspi_camera::account::LossCounters;
+use nirspi_camera::account::{FailedChecks, LossCounters};
+use nirspi_camera::tally::Tally;
 use nirspi_files::causes;
 use nirspi_recon::words::count;
 
@@ -12,12 +13,12 @@ impl Capture {
     /// stopped it, or its time is over, and all frames made have arrived.
     #[must_use]
     pub fn missing(&self) -> Option<String> {
-        let parts: Vec<String> = [self.end(), frames(self.counters)]
-            .into_iter()
-            .flatten()
-            .chain(self.packets())
-            .collect();
-        (!parts.is_empty()).then(|| parts.join("; "))
+        lacks(self.end(), self.counters, self.failed_checks)
+    }
+
+    /// The same for the last file of several, whose frames this tally has.
+    pub(super) fn missing_in(&self, tally: &Tally) -> Option<String> {
+        lacking(self.end(), tally)
     }
 
     /// How the run ended, if not as requested.
@@ -77,18 +78,27 @@ impl Capture {
             (None, _) => String::new(),
         }
     }
+}
 
-    /// Damaged packets: the checks that they failed, and how many were no frames of the run.
-    fn packets(&self) -> Option<String> {
-        let packets = self.failed_checks.packets();
-        let others = match packets.saturating_sub(self.counters.corrupt) {
-            0 => String::new(),
-            others => format!("; {others} of them of unknown content, beyond these frames"),
-        };
-        (packets > 0).then(|| {
-            format!("{}: {}{others}", count(packets, "damaged packet"), self.failed_checks)
-        })
-    }
+/// What a file of a run lacks, besides how the run ended.
+pub(super) fn lacking(end: Option<String>, tally: &Tally) -> Option<String> {
+    lacks(end, tally.account().counters(), tally.account().failed_checks())
+}
+
+fn lacks(end: Option<String>, counters: LossCounters, failed: FailedChecks) -> Option<String> {
+    let parts = [end, frames(counters), packets(counters, failed)];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+/// Damaged packets: the checks that they failed, and how many were no frames of the run.
+fn packets(counters: LossCounters, failed: FailedChecks) -> Option<String> {
+    let packets = failed.packets();
+    let others = match packets.saturating_sub(counters.corrupt) {
+        0 => String::new(),
+        others => format!("; {others} of them of unknown content, beyond these frames"),
+    };
+    (packets > 0).then(|| format!("{}: {failed}{others}", count(packets, "damaged packet")))
 }
 
 /// Frames made that did not arrive whole and in order.
@@ -100,7 +110,6 @@ fn frames(counters: LossCounters) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nirspi_camera::account::FailedChecks;
     use nirspi_camera::integrate::Integrated;
     use nirspi_camera::session::SessionError;
     use nirspi_camera::setup::MeasurementSetup;
@@ -145,6 +154,7 @@ mod tests {
             asked: Some(50),
             made: Some(50),
             recording: None,
+            files: Vec::new(),
             ended: Ended::Complete,
             elapsed: Duration::from_secs(1),
         }

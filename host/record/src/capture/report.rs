@@ -8,16 +8,18 @@ use nirspi_files::causes::in_one_line;
 use nirspi_files::identity::CameraIdentity;
 use serde::Serialize;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a capture gave, and what it lacks.
 #[derive(Debug, Serialize)]
 pub struct CaptureReport<'r> {
     /// The camera.
     pub camera: &'r CameraIdentity,
-    /// The file.
+    /// The file, or the first of several files.
     pub recording: &'r Path,
-    /// Size of the file.
+    /// All files, in their order.
+    pub files: &'r [PathBuf],
+    /// Size of all files.
     pub bytes: u64,
     /// The loss counters.
     pub frames: LossCounters,
@@ -60,23 +62,25 @@ pub struct CaptureReport<'r> {
 }
 
 impl<'r> CaptureReport<'r> {
-    /// The report of a capture into the file `path`, with this choice of calibration.
+    /// The report of a capture with this choice of calibration.
     ///
     /// # Errors
-    /// If the file is gone.
+    /// If a file of the recording is gone.
     pub fn new(
         camera: &'r CameraIdentity,
-        path: &'r Path,
         choice: &'r Choice,
-        captured: &Capture,
+        captured: &'r Capture,
     ) -> io::Result<Self> {
+        let files = &captured.files;
+        let bytes = files.iter().map(|path| Ok(std::fs::metadata(path)?.len()));
         let counters = captured.counters;
         let seconds = captured.elapsed.as_secs_f64();
         let missing = captured.missing();
         Ok(Self {
             camera,
-            recording: path,
-            bytes: std::fs::metadata(path)?.len(),
+            recording: files.first().map_or(Path::new(""), PathBuf::as_path),
+            files,
+            bytes: bytes.sum::<io::Result<u64>>()?,
             frames: counters,
             made: captured.made,
             damaged_packets: captured.failed_checks.packets(),
@@ -108,8 +112,8 @@ impl<'r> CaptureReport<'r> {
         choice: &'r Choice,
         error: &'r CaptureError,
     ) -> io::Result<Option<Self>> {
-        let CaptureError::RecordingCut { path, captured, .. } = error else { return Ok(None) };
-        let report = Self::new(camera, path, choice, captured)?;
+        let CaptureError::RecordingCut { captured, .. } = error else { return Ok(None) };
+        let report = Self::new(camera, choice, captured)?;
         let missing = std::iter::once(in_one_line(error)).chain(report.missing);
         let missing = Some(missing.collect::<Vec<_>>().join("; "));
         Ok(Some(Self { complete: false, missing, ..report }))

@@ -1,11 +1,12 @@
 //! One run of a capture in turns, so that a caller can do other work in between.
 
+use super::files::RunRecorder;
 use super::frames_due::FramesDue;
 use super::junk::Junk;
 use super::{
     Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
 };
-use crate::recording::{Recorder, Recording, RunAccount, tally_recording};
+use crate::recording::{Recording, RunAccount, tally_recording};
 use nirspi_camera::calibration::{CalibrationError, calibrate, calibrate_or};
 use nirspi_camera::response::Settling;
 use nirspi_camera::session::{
@@ -20,7 +21,7 @@ use nirspi_wire::{
 };
 use std::io;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 /// Interval of the host's messages while it only listens.
@@ -65,7 +66,7 @@ pub struct Run {
     asked: Option<u32>,
     number: u16,
     tally: Tally,
-    recorder: Option<Recorder>,
+    recorder: Option<RunRecorder>,
     recorder_error: Option<io::Error>,
     fault: Option<Fault>,
     status: Option<Status>,
@@ -113,7 +114,7 @@ impl Listener for Packets<'_> {
         let before = run.tally.arrived();
         let received = run.tally.packet(content);
         if let (Some(recorder), None) = (&mut run.recorder, &run.recorder_error) {
-            run.recorder_error = recorder.heard(content, &run.tally).err();
+            run.recorder_error = recorder.heard(content, &run.tally, received).err();
         }
         run.junk.packet(raw.len(), content, run.tally.arrived() > before, now);
         match content {
@@ -181,14 +182,15 @@ impl Run {
             None => None,
             Some(target) => {
                 let (identity, settling) = (session.identity(), settling.as_ref());
-                let made = Recorder::create(target, identity, &setup, settling, Some(number));
+                let made = RunRecorder::create(target, identity, &setup, settling, Some(number));
                 let path = || target.path().to_owned();
                 Some(made.map_err(|source| CaptureError::Recording { path: path(), source })?)
             }
         };
         observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
         let now = Instant::now();
-        let tally = Tally::new(&setup, Some(number));
+        let first = replayed.as_ref().map_or(0, |recorded| recorded.first_frame);
+        let tally = Tally::new(&setup, Some(number)).beginning_at(first);
         let due = FramesDue::new(setup.frame_ns(), now);
         let mut run = Self {
             setup,
@@ -246,11 +248,28 @@ impl Run {
 
     /// Whether the camera has sent more frames than requested.
     fn has_more_than_asked(&self) -> bool {
-        self.asked.is_some_and(|asked| self.tally.account().accounted() > u64::from(asked))
+        self.asked.is_some_and(|asked| self.accounted() > u64::from(asked))
+    }
+
+    /// Number of frames in the account.
+    fn accounted(&self) -> u64 {
+        self.tally.account().accounted() - self.tally.account().first()
+    }
+
+    /// Number of frames that the camera reports to have made. A replay of a file in the middle of a run
+    /// makes those from its first frame on.
+    fn made(&self) -> Option<u64> {
+        let first = self.tally.account().first();
+        self.tally.made().map(|made| made.saturating_sub(first))
+    }
+
+    /// Whether the recording takes no more, or cannot go on in its next file.
+    fn cannot_record(&self) -> bool {
+        self.recorder_error.is_some() || self.recorder.as_ref().is_some_and(RunRecorder::must_stop)
     }
 
     /// Writes to the recording, if there is one without an earlier error.
-    fn record(&mut self, write: impl FnOnce(&mut Recorder) -> io::Result<()>) {
+    fn record(&mut self, write: impl FnOnce(&mut RunRecorder) -> io::Result<()>) {
         if let Some(recorder) = &mut self.recorder
             && self.recorder_error.is_none()
         {
@@ -269,7 +288,7 @@ impl Run {
         }
         if self.watched.elapsed() > TURN {
             self.watched = Instant::now();
-            self.record(Recorder::flush_if_due);
+            self.record(RunRecorder::flush_if_due);
             let counters = self.tally.account().counters();
             let progress = Progress {
                 counters,
@@ -277,12 +296,12 @@ impl Run {
                 waited: Some(session.waited()),
                 device_time_us: self.tally.device_time_us(),
                 failed_checks: self.tally.account().failed_checks(),
-                queued: self.recorder.as_ref().map_or(0.0, Recorder::queued),
+                queued: self.recorder.as_ref().map_or(0.0, RunRecorder::queued),
             };
             let cause = match observer.watch(&progress) {
                 ControlFlow::Break(cause) => Some(cause),
                 // The error of the recording is what ends the capture.
-                ControlFlow::Continue(()) => self.recorder_error.as_ref().map(|_| StopCause::User),
+                ControlFlow::Continue(()) => self.cannot_record().then_some(StopCause::User),
             };
             if let Some(cause) = cause
                 && self.stopped.is_none()
@@ -351,6 +370,7 @@ impl Run {
                 return Err(error.into());
             }
         };
+        let made = self.made();
         let account = self.tally.account();
         let mut captured = Capture {
             camera: session.identity().clone(),
@@ -364,18 +384,24 @@ impl Run {
             repeated: account.repeated(),
             status: self.status,
             asked: self.asked,
-            made: self.tally.made(),
+            made,
             recording: None,
+            files: Vec::new(),
             ended,
             elapsed: self.started.elapsed(),
         };
         if let Some(recorder) = self.recorder {
-            match finish(recorder, self.recorder_error, &captured) {
-                Ok(path) => captured.recording = Some(path),
-                Err((path, source)) => {
-                    let (held, captured) = (frames_held(&path), Box::new(captured));
-                    return Err(CaptureError::RecordingCut { path, source, held, captured });
-                }
+            let Capture { counters, asked, made, .. } = captured;
+            let missing = captured.missing();
+            let account = RunAccount { counters, asked, made, missing, continues: None };
+            let missing_in = |tally: &Tally| captured.missing_in(tally);
+            let recorded = recorder.finish(self.recorder_error, account, missing_in);
+            captured.recording = recorded.files.first().cloned();
+            captured.files = recorded.files;
+            if let Some((path, source)) = recorded.failed {
+                let held = captured.files.iter().map(|path| frames_held(path)).sum();
+                let captured = Box::new(captured);
+                return Err(CaptureError::RecordingCut { path, source, held, captured });
             }
         }
         Ok(captured)
@@ -399,12 +425,12 @@ impl Run {
         let asked = self.asked;
         if !self.tally.has_ended() {
             self.stop_at_once(session, observer, StopCause::User)?;
-            return Ok(Ended::WrongNumber { made: self.tally.account().accounted(), asked });
+            return Ok(Ended::WrongNumber { made: self.accounted(), asked });
         }
         // The status also shows a fault whose event was in a damaged packet.
         let status = session.status(&mut Packets { run: self, observer });
-        let accounted = self.tally.account().accounted();
-        let made = self.tally.made().unwrap_or(accounted);
+        let accounted = self.accounted();
+        let made = self.made().unwrap_or(accounted);
         // The number that the camera reports and the number that arrived must both be the number
         // requested.
         // A replay is whole when the recorded run is over.
@@ -437,20 +463,6 @@ impl Run {
             Err(SessionError::Refused { .. }) | Ok(()) => Ok(()),
             Err(error) => Err(error),
         }
-    }
-}
-
-/// Closes the recording of a capture. Returns its path, also beside the reason why it could not be finished.
-fn finish(
-    recorder: Recorder,
-    failed: Option<io::Error>,
-    captured: &Capture,
-) -> Result<PathBuf, (PathBuf, io::Error)> {
-    let Capture { counters, asked, made, .. } = *captured;
-    let account = RunAccount { counters, asked, made, missing: captured.missing() };
-    match failed {
-        None => recorder.finish(&account),
-        Some(error) => Err((recorder.path().to_owned(), error)),
     }
 }
 

@@ -3,8 +3,8 @@
 use super::monitor::Monitor;
 use super::schemas::{self, Channel};
 use super::{
-    ACCOUNT, CHECKSUM, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC, encoding,
-    reader::checksum,
+    ACCOUNT, CHECKSUM, IDENTITY, JSON, PART, PROFILE, Part, RUN, RunAccount, SETTLING, SETUP,
+    TOPIC, encoding, reader::checksum,
 };
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
@@ -23,6 +23,17 @@ use std::io::{self, Write};
 /// Bytes of a chunk. A chunk that is not full is written with each flush.
 const CHUNK: u64 = 1 << 20;
 
+/// Bytes that a file adds to each message: the head of the record, and its place in the index.
+const SIZE_OF_MESSAGE: u64 = 31 + 17;
+/// Bytes that a file adds to a chunk: its head, the index of each channel, and its place in the summary.
+const SIZE_OF_CHUNK: u64 = 600;
+/// Schemas, channels (twice), the account and the summary of a file.
+const SIZE_OF_REST: u64 = 40_000;
+
+fn size_of_note(name: &str, json: &str) -> u64 {
+    (name.len() + json.len()) as u64 + 200
+}
+
 /// What a recording says before its packets.
 #[derive(Debug, Clone, Copy)]
 pub struct Opening<'o> {
@@ -34,6 +45,8 @@ pub struct Opening<'o> {
     pub settling: Option<&'o Settling>,
     /// The number of the run whose frames count.
     pub run: Option<u16>,
+    /// The place of the file in a run of several files.
+    pub part: Option<&'o Part>,
     /// The provenance of an export; a recording is the readings themselves.
     pub provenance: Option<&'o Provenance>,
 }
@@ -47,6 +60,8 @@ pub struct Book<W: Write> {
     sequences: [u32; Channel::RECORDED.len() + 1],
     opening: Vec<(&'static str, String)>,
     monitor: Monitor,
+    /// An estimate of the file's size if the book ended now, a little too high.
+    bytes: u64,
 }
 
 fn to_io(error: McapError) -> io::Error {
@@ -70,6 +85,7 @@ impl<W: Write> Book<W> {
         let mut parts = vec![part(IDENTITY, opening.identity)?, part(SETUP, opening.setup)?];
         parts.extend(opening.settling.map(|settling| part(SETTLING, settling)).transpose()?);
         parts.extend(opening.run.map(|run| part(RUN, &run)).transpose()?);
+        parts.extend(opening.part.map(|place| part(PART, place)).transpose()?);
         parts.extend(opening.provenance.map(|made| part(KEY, made)).transpose()?);
         let begun = || -> Result<_, McapError> {
             let mut writer = options.create(NoSeek::new(to))?;
@@ -90,7 +106,9 @@ impl<W: Write> Book<W> {
         let (writer, wire, channels) = begun().map_err(to_io)?;
         let sequences = [0; Channel::RECORDED.len() + 1];
         let monitor = Monitor::default();
-        let mut book = Self { writer, wire, channels, sequences, opening: parts, monitor };
+        let noted = parts.iter().map(|(name, json)| size_of_note(name, json)).sum::<u64>();
+        let bytes = SIZE_OF_REST + 2 * noted;
+        let mut book = Self { writer, wire, channels, sequences, opening: parts, monitor, bytes };
         book.write_opening()?;
         // After this flush the file identifies itself, whatever happens.
         book.flush()?;
@@ -107,6 +125,7 @@ impl<W: Write> Book<W> {
     fn message(&mut self, channel: u16, number: usize, time: u64, data: &[u8]) -> io::Result<()> {
         let sequence = self.sequences[number];
         self.sequences[number] = sequence.wrapping_add(1);
+        self.bytes += SIZE_OF_MESSAGE + data.len() as u64;
         let header =
             MessageHeader { channel_id: channel, sequence, log_time: time, publish_time: time };
         self.writer.write_to_known_channel(&header, data).map_err(to_io)
@@ -115,6 +134,23 @@ impl<W: Write> Book<W> {
     fn other(&mut self, channel: Channel, time_ns: u64, data: &[u8]) -> io::Result<()> {
         let at = Channel::RECORDED.iter().position(|&other| other == channel).unwrap_or(0);
         self.message(self.channels[at], at + 1, time_ns, data)
+    }
+
+    /// An estimate of the file's size if the book ended now, a little too high.
+    pub(super) fn size(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Says which place the file has in its run, before the first packet.
+    ///
+    /// # Errors
+    /// The writer's error.
+    pub(super) fn place(&mut self, place: &Part) -> io::Result<()> {
+        let (name, json) = part(PART, place)?;
+        note(&mut self.writer, name, &json)?;
+        self.bytes += 2 * size_of_note(name, &json);
+        self.opening.push((name, json));
+        Ok(())
     }
 
     /// Writes a packet as received.
@@ -196,6 +232,7 @@ impl<W: Write> Book<W> {
     /// # Errors
     /// The writer's error.
     pub fn flush(&mut self) -> io::Result<()> {
+        self.bytes += SIZE_OF_CHUNK;
         self.writer.flush().map_err(to_io)
     }
 

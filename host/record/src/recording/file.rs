@@ -7,6 +7,7 @@
 //! recording is whole and on the disk
 //! (`tests::the_old_recording_goes_when_the_new_one_stands_and_not_before`).
 
+use super::split::{Split, name_of, part_path, taken_part};
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -30,6 +31,11 @@ pub enum Target {
     Replace(PathBuf),
     /// The first free name of `capture-1.mcap`, `capture-2.mcap` ... in this folder.
     FirstFree(PathBuf),
+    /// Several files, `NAME-0001.mcap`, `NAME-0002.mcap` ... for this `NAME.mcap`. None of them may exist.
+    Parts(PathBuf, Split),
+    /// The same for the first name of `capture-1.mcap`, `capture-2.mcap` ... in this folder of which
+    /// nothing exists.
+    FirstFreeParts(PathBuf, Split),
 }
 
 impl Target {
@@ -38,6 +44,27 @@ impl Target {
     pub fn path(&self) -> &Path {
         match self {
             Self::New(path) | Self::Replace(path) | Self::FirstFree(path) => path,
+            Self::Parts(path, _) | Self::FirstFreeParts(path, _) => path,
+        }
+    }
+
+    /// When the recording goes on in another file; `None` for a recording in one file.
+    #[must_use]
+    pub fn split(&self) -> Option<Split> {
+        match self {
+            Self::New(_) | Self::Replace(_) | Self::FirstFree(_) => None,
+            Self::Parts(_, split) | Self::FirstFreeParts(_, split) => Some(*split),
+        }
+    }
+
+    /// What exists already under a name of this recording, if nothing of that name may exist.
+    #[must_use]
+    pub fn taken(&self) -> Option<PathBuf> {
+        match self {
+            Self::New(path) => path.exists().then(|| path.clone()),
+            // A folder that cannot be read is an error when the file is made.
+            Self::Parts(path, _) => taken_part(path).ok().flatten(),
+            Self::Replace(_) | Self::FirstFree(_) | Self::FirstFreeParts(..) => None,
         }
     }
 }
@@ -74,9 +101,35 @@ impl Place {
                 made => made,
             },
             Target::FirstFree(folder) => {
-                first_free(|n| folder.join(format!("capture-{n}.mcap")), None)
+                first_free(|n| Some(folder.join(format!("capture-{n}.mcap"))), None)
+            }
+            Target::Parts(whole, _) => {
+                if is_device(whole) {
+                    let problem = "a device, expected the name of a file to be split";
+                    return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+                }
+                match taken_part(whole)? {
+                    Some(taken) => Err(is_taken(&taken)),
+                    None => Self::of_part(part_path(whole, 1)),
+                }
+            }
+            Target::FirstFreeParts(folder, _) => {
+                taken_part(&folder.join("capture.mcap"))?;
+                let name = |n: u32| {
+                    let whole = folder.join(format!("capture-{n}.mcap"));
+                    matches!(taken_part(&whole), Ok(None)).then(|| part_path(&whole, 1))
+                };
+                first_free(name, None)
             }
         }
+    }
+
+    /// Makes a file of a run in several files.
+    fn of_part(path: PathBuf) -> io::Result<(Self, File)> {
+        Self::of_new(path.clone(), None).map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => is_taken(&path),
+            _ => error,
+        })
     }
 
     /// Makes a new file next to the file that it will replace. A link stays, and the file behind
@@ -91,7 +144,7 @@ impl Place {
             name.push(if n == 1 { ".new.mcap".to_owned() } else { format!(".new-{n}.mcap") });
             path.with_file_name(name)
         };
-        first_free(name, Some(&path))
+        first_free(|n| Some(name(n)), Some(&path))
     }
 
     fn of_new(path: PathBuf, replaces: Option<PathBuf>) -> io::Result<(Self, File)> {
@@ -136,10 +189,18 @@ impl Place {
     }
 }
 
+fn is_taken(path: &Path) -> io::Error {
+    let problem = format!("{} is there already, choose another name", name_of(path));
+    io::Error::new(io::ErrorKind::AlreadyExists, problem)
+}
+
 /// The first free name of these names.
-fn first_free(name: impl Fn(u32) -> PathBuf, replaces: Option<&Path>) -> io::Result<(Place, File)> {
-    for n in 1..NAMES {
-        match Place::of_new(name(n), replaces.map(Path::to_owned)) {
+fn first_free(
+    name: impl Fn(u32) -> Option<PathBuf>,
+    replaces: Option<&Path>,
+) -> io::Result<(Place, File)> {
+    for path in (1..NAMES).filter_map(name) {
+        match Place::of_new(path, replaces.map(Path::to_owned)) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
             made => return made,
         }

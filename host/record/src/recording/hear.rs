@@ -38,7 +38,7 @@ pub fn hear_recording<E: From<RecordingError>>(
     recording: &mut Recording,
     mut hear: impl FnMut(&Heard<'_>, &Tally) -> Result<(), E>,
 ) -> Result<Tally, E> {
-    let mut tally = Tally::new(&recording.setup, recording.run);
+    let mut tally = recording.tally();
     let mut scratch = Vec::new();
     for packet in recording {
         let packet = packet?;

@@ -1,6 +1,6 @@
 //! What a recording holds, for people and scripts.
 
-use super::{Recording, RecordingError, RunAccount};
+use super::{Part, Recording, RecordingError, RunAccount};
 use crate::recording::hear_recording;
 use nirspi_camera::account::{FailedChecks, LossCounters};
 use nirspi_files::clock::date;
@@ -35,6 +35,8 @@ pub struct RecordingInfo {
     pub account: Option<RunAccount>,
     /// Number of the recorded run.
     pub run: Option<u16>,
+    /// The place of the file in a run of several files; `null` for a run in one file.
+    pub part: Option<Part>,
     /// Name of the patterns' order.
     pub order: String,
     /// Patterns of a sweep.
@@ -78,7 +80,7 @@ impl RecordingInfo {
             span.map_or(0.0, |(first, last)| (last - first) as f64 * unit)
         };
         let end = recording.end().clone();
-        let Recording { identity, setup, settling, run, .. } = recording;
+        let Recording { identity, setup, settling, run, part, .. } = recording;
         Ok(Self {
             recording: path.to_owned(),
             bytes: std::fs::metadata(path).map_or(0, |file| file.len()),
@@ -91,6 +93,7 @@ impl RecordingInfo {
             failed_checks: tally.account().failed_checks(),
             account: end.account,
             run,
+            part,
             patterns: setup.rows.len(),
             order: setup.order,
             differential: setup.differential,
@@ -111,6 +114,13 @@ impl fmt::Display for RecordingInfo {
         let begun = self.begun.as_deref().unwrap_or("without a packet");
         let megabytes = self.bytes as f64 / 1e6;
         writeln!(f, "{}: recording of {begun}, {megabytes:.1} MB", self.recording.display())?;
+        if let Some(Part { number, first_frame, follows }) = &self.part {
+            let follows = follows.as_ref().map(|name| format!(", after {}", name.escape_debug()));
+            let goes_on = self.account.as_ref().and_then(|account| account.continues.as_ref());
+            let goes_on = goes_on.map(|name| format!(", goes on in {}", name.escape_debug()));
+            let (follows, goes_on) = (follows.unwrap_or_default(), goes_on.unwrap_or_default());
+            writeln!(f, "file {number} of its run, from frame {first_frame} on{follows}{goes_on}")?;
+        }
         let (board, serial) = (camera.board.escape_debug(), camera.serial.escape_debug());
         writeln!(f, "camera {board} {serial}, wire protocol {}", camera.protocol)?;
         let pairs =

@@ -4,7 +4,8 @@
 //! Channel `/wire` holds the packets (COBS, delimiter included), both intact and damaged. The
 //! message encoding names the protocol version of the session. Recordings of all versions from
 //! `version::MIN` on are read. Metadata records hold the camera's identity, the setup, the
-//! calibration, the number of the run and, at the end, the account of the run; each is one JSON
+//! calibration, the number of the run, the place of a file in a run of several files (`split`), and, at
+//! the end, the account of the run; each is one JSON
 //! text with a checksum, and stands once more at the end. Channels `/telemetry` and `/log`, and
 //! `/image` and `/calibration` in an exported file, say the same in forms that other programs show
 //! (`schemas.rs`); nothing is read from them. Times are nanoseconds of the host's clock. Records are
@@ -29,6 +30,7 @@ mod recover;
 mod run;
 mod scan;
 mod schemas;
+mod split;
 mod spool;
 mod sync;
 mod writer;
@@ -42,6 +44,8 @@ pub use recover::{RecoverError, Recovered, recover};
 pub use run::RunAccount;
 pub use scan::Damage;
 pub use schemas::Pinhole;
+pub use split::{Part, Split, SplitError};
+pub(crate) use split::{name_of, part_path};
 pub use writer::Recorder;
 
 /// MCAP profile of nirspi's files.
@@ -68,6 +72,8 @@ const SETTLING: &str = "nirspi.settling";
 /// Number of the recorded run. Frames of another run are stragglers. Recordings before 0.2 have no
 /// number.
 const RUN: &str = "nirspi.run";
+/// The place of the file in a run of several files. A run in one file has no such record.
+const PART: &str = "nirspi.part";
 const ACCOUNT: &str = "nirspi.account";
 /// The key of the text in each metadata record.
 const JSON: &str = "json";

@@ -2,11 +2,12 @@
 
 use super::scan::{Damage, Entry, Scan};
 use super::{
-    ACCOUNT, CHECKSUM, IDENTITY, JSON, PROFILE, RUN, RunAccount, SETTLING, SETUP, TOPIC,
-    protocol_of,
+    ACCOUNT, CHECKSUM, IDENTITY, JSON, PART, PROFILE, Part, RUN, RunAccount, SETTLING, SETUP,
+    TOPIC, protocol_of,
 };
 use nirspi_camera::response::Settling;
 use nirspi_camera::setup::MeasurementSetup;
+use nirspi_camera::tally::Tally;
 use nirspi_files::identity::CameraIdentity;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{crc32, version};
@@ -40,6 +41,8 @@ pub struct Recording {
     /// Number of the run whose frames count; `None` for a recording without a number, in which the
     /// first frame's run counts.
     pub run: Option<u16>,
+    /// The place of the file in a run of several files; `None` for a run in one file.
+    pub part: Option<Part>,
     records: Records,
     /// The first packet, which was read at the end of the header.
     first: Option<Packet>,
@@ -113,7 +116,20 @@ impl Recording {
             end = End::default();
         }
         end.account = parts.account;
-        Ok(Self { identity, setup, settling: parts.settling, run: parts.run, records, first, end })
+        let Parts { settling, run, part, .. } = parts;
+        Ok(Self { identity, setup, settling, run, part, records, first, end })
+    }
+
+    /// Number of the first frame of the file in its run.
+    #[must_use]
+    pub fn first_frame(&self) -> u64 {
+        self.part.as_ref().map_or(0, |part| part.first_frame)
+    }
+
+    /// The tally of the recording before its first packet.
+    #[must_use]
+    pub fn tally(&self) -> Tally {
+        Tally::new(&self.setup, self.run).beginning_at(self.first_frame())
     }
 
     /// The information at the end of the recording. Complete after the iterator has returned its
@@ -345,6 +361,7 @@ struct Parts {
     setup: Option<MeasurementSetup>,
     settling: Option<Settling>,
     run: Option<u16>,
+    part: Option<Part>,
     account: Option<RunAccount>,
     /// Whether the identity has a checksum, and this program speaks its protocol.
     is_vouched: bool,
@@ -364,6 +381,7 @@ impl Parts {
                 found.check().map_err(|problem| problem.to_string())
             }),
             RUN => fill(&mut self.run, path, "run", texts, |_| Ok(())),
+            PART => fill(&mut self.part, path, "part", texts, Part::check),
             ACCOUNT => fill(&mut self.account, path, "account", texts, |_| Ok(())),
             _ => Ok(false),
         };

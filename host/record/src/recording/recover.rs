@@ -73,7 +73,8 @@ fn copy(path: &Path, file: impl Write, out: &Path) -> Result<Recovered, RecoverE
     let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
     let (identity, run) = (recording.identity.clone(), recording.run);
     let (identity, setup, settling) = (&identity, &setup, settling.as_ref());
-    let opening = Opening { identity, setup, settling, run, provenance: None };
+    let part = recording.part.clone();
+    let opening = Opening { identity, setup, settling, run, part: part.as_ref(), provenance: None };
     let mut book = Book::begin(file, &opening).map_err(write)?;
     let mut tally = hear_recording(&mut recording, |heard, tally| {
         book.packet(heard.time_ns, heard.raw)
@@ -95,7 +96,13 @@ fn copy(path: &Path, file: impl Write, out: &Path) -> Result<Recovered, RecoverE
             let before = old.missing.map_or_else(String::new, |missing| format!("; {missing}"));
             let missing = Some(format!("recovered, {damage}{before}"));
             let made = tally.made();
-            RunAccount { counters: frames, asked: old.asked, made, missing }
+            RunAccount {
+                counters: frames,
+                asked: old.asked,
+                made,
+                missing,
+                continues: old.continues,
+            }
         }
     };
     book.end(Some(&account)).map_err(write)?;

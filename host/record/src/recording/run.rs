@@ -18,6 +18,10 @@ pub struct RunAccount {
     /// What the run lacks, in one line; `None` if nothing is missing.
     #[serde(default)]
     pub missing: Option<String>,
+    /// Name of the file in which the recording goes on; `None` if the run ended in this file. The
+    /// counters are of this file, [`asked`](Self::asked) and [`made`](Self::made) of the whole run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continues: Option<String>,
 }
 
 #[cfg(test)]

@@ -3,10 +3,10 @@
 //! The disk has a thread of its own behind a queue (`spool`), so the thread that reads the camera waits
 //! for the disk only when the queue is full.
 
-use super::RunAccount;
 use super::book::{Book, Opening};
 use super::file::{Place, Target};
 use super::spool::{self, Disk, Spool};
+use super::{Part, RunAccount};
 use nirspi_camera::response::Settling;
 use nirspi_camera::setup::MeasurementSetup;
 use nirspi_camera::tally::Tally;
@@ -28,11 +28,29 @@ pub struct Recorder {
     disk: Disk,
     /// The same file, for syncing to the disk.
     file: File,
-    epoch: u64,
-    started: Instant,
+    clock: Clock,
     flushed: Instant,
     /// Time of the newest packet.
     newest: u64,
+}
+
+/// The clock of the packets' times. All files of a run have the same one.
+#[derive(Debug, Clone, Copy)]
+struct Clock {
+    epoch: u64,
+    started: Instant,
+}
+
+impl Clock {
+    fn start() -> Self {
+        let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
+        Self { epoch: u64::try_from(epoch).unwrap_or(u64::MAX), started: Instant::now() }
+    }
+
+    fn now(&self) -> u64 {
+        let age = u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        self.epoch.saturating_add(age)
+    }
 }
 
 impl Recorder {
@@ -51,7 +69,7 @@ impl Recorder {
     ) -> io::Result<Self> {
         let (place, file) = Place::make(target)?;
         let begun = file.try_clone().and_then(|clone| {
-            let opening = Opening { identity, setup, settling, run, provenance: None };
+            let opening = Opening { identity, setup, settling, run, part: None, provenance: None };
             let (spool, disk) = spool::start(clone)?;
             let book = Book::begin(spool, &opening)?;
             disk.settle()?;
@@ -64,10 +82,28 @@ impl Recorder {
                 return Err(error);
             }
         };
-        let epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
-        let epoch = u64::try_from(epoch).unwrap_or(u64::MAX);
-        let now = Instant::now();
-        Ok(Self { place, book, disk, file, epoch, started: now, flushed: now, newest: epoch })
+        let clock = Clock::start();
+        let (flushed, newest) = (clock.started, clock.epoch);
+        Ok(Self { place, book, disk, file, clock, flushed, newest })
+    }
+
+    /// Makes this the file of a run that follows `before`, with the same clock. To be called before
+    /// the first packet. The first file has none before it.
+    pub(crate) fn follow(&mut self, before: Option<&Self>, place: &Part) -> io::Result<()> {
+        if let Some(before) = before {
+            (self.clock, self.newest) = (before.clock, before.newest);
+        }
+        self.book.place(place)
+    }
+
+    /// An estimate of the file's size if the recording ended now, a little too high.
+    pub(crate) fn size(&self) -> u64 {
+        self.book.size()
+    }
+
+    /// Time of the newest packet in ns of the host's clock.
+    pub(crate) fn newest_ns(&self) -> u64 {
+        self.newest
     }
 
     /// The current path of the file.
@@ -87,8 +123,7 @@ impl Recorder {
     /// # Errors
     /// If the disk is full or gone.
     pub fn packet(&mut self, raw: &[u8]) -> io::Result<()> {
-        let age = u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX);
-        self.newest = self.epoch.saturating_add(age);
+        self.newest = self.clock.now();
         self.book.packet(self.newest, raw)?;
         self.flush_if_due()
     }

@@ -49,12 +49,13 @@ impl ReplayLink {
             Some(run) => run,
             None => first_run(&mut recording)?,
         };
+        let first_frame = recording.first_frame();
         let Recording { identity, setup, settling, .. } = recording;
         Ok(Self {
             path: address.path.clone(),
             speed: address.speed,
             identity,
-            recorded: Recorded { setup, settling },
+            recorded: Recorded { setup, settling, first_frame },
             run,
             status: status(run.wrapping_sub(1)),
             incoming: Box::default(),

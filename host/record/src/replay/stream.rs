@@ -17,9 +17,14 @@ pub(super) struct Playing {
     /// The camera's time of the first packet that has one, and the time at which the packet was
     /// sent.
     began: Option<(u64, Instant)>,
+    /// The camera's time of the newest packet that was sent.
+    newest_us: u64,
     /// The packet that is due next, with the camera's time if the packet has one.
     next: Option<Next>,
-    /// Frames of the run that were sent, by their numbers.
+    /// Number of the recording's first frame in the run.
+    first: u64,
+    /// Frames of the run that were sent, by their numbers. A recording in the middle of a run counts
+    /// the frames before its first one.
     pub(super) made: u32,
     /// The status that the recorded camera reported last.
     pub(super) reported: Option<Status>,
@@ -49,14 +54,17 @@ pub(super) enum Turn {
 
 impl Playing {
     pub(super) fn new(packets: Recording, run: u16, speed: Speed, asked: Option<u32>) -> Self {
+        let first = packets.first_frame();
         Self {
             packets,
+            first,
             run,
             speed,
             asked,
             began: None,
+            newest_us: 0,
             next: None,
-            made: 0,
+            made: first as u32,
             reported: None,
             has_ended: false,
             is_short: false,
@@ -79,6 +87,7 @@ impl Playing {
         }
         self.has_ended |= next.ends;
         self.made = next.made;
+        self.newest_us = next.device_time_us.unwrap_or(self.newest_us);
         Ok(Turn::Send(next.bytes))
     }
 
@@ -112,7 +121,7 @@ impl Playing {
                 }
                 Ok(DeviceMessage::Frame(frame)) => {
                     if frame.run == self.run {
-                        if self.asked.is_some_and(|asked| frame.sequence >= asked) {
+                        if self.has_enough_before(frame.sequence) {
                             return Ok(self.end(frame.device_time_us));
                         }
                         made = made.max(frame.sequence.saturating_add(1));
@@ -123,7 +132,7 @@ impl Playing {
                 Ok(DeviceMessage::Event(Event { device_time_us, kind })) => {
                     let ends = match kind {
                         EventKind::RunEnded { run, frames_made, .. } if run == self.run => {
-                            if self.asked.is_some_and(|asked| frames_made > asked) {
+                            if self.has_enough_before(frames_made.saturating_sub(1)) {
                                 return Ok(self.end(device_time_us));
                             }
                             made = frames_made;
@@ -137,13 +146,31 @@ impl Playing {
             };
             return Ok(Some(Next { bytes: as_sent(packet), device_time_us, made, ends }));
         }
+        let account = self.packets.end().account.as_ref();
+        let goes_on = account.is_some_and(|account| account.continues.is_some());
+        // The recorded run goes on in another file, and the replayed one ends with this file.
+        if goes_on && !self.is_short && !self.has_ended {
+            return Ok(self.end_after(self.made, self.newest_us));
+        }
         Ok(None)
+    }
+
+    /// Whether the run has all frames that were asked for before the frame of this number.
+    fn has_enough_before(&self, sequence: u32) -> bool {
+        let ahead = sequence.wrapping_sub(self.first as u32);
+        // A frame from before the recording's first one is a straggler.
+        let is_before = self.first > 0 && ahead > u32::MAX / 2;
+        !is_before && self.asked.is_some_and(|asked| ahead >= asked)
     }
 
     /// The end of a run that is shorter than the recorded one.
     fn end(&mut self, device_time_us: u64) -> Option<Next> {
+        let made = self.asked.map_or(self.made, |asked| asked.wrapping_add(self.first as u32));
+        self.end_after(made, device_time_us)
+    }
+
+    fn end_after(&mut self, made: u32, device_time_us: u64) -> Option<Next> {
         self.is_short = true;
-        let made = self.asked.unwrap_or(self.made);
         let bytes = run_ended(self.run, made, device_time_us);
         Some(Next { bytes, device_time_us: Some(device_time_us), made, ends: true })
     }

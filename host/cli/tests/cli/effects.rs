@@ -1,0 +1,89 @@
+//! Options that change what is measured or what a script learns: each is seen in the file, the camera or the exit code.
+
+use crate::bench::{Bench, Process};
+use nirspi::address::CameraAddress;
+use nirspi::session::{IgnorePackets, request};
+use nirspi::setup::MeasurementSetup;
+use nirspi_recon::Order;
+use nirspi_wire::RunLength;
+use std::time::Duration;
+
+/// The recording of the wire protocol's first version.
+const RECORDING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/v1.mcap");
+
+/// Every value is another one than the default.
+#[test]
+fn a_capture_is_of_the_setup_that_was_asked_for() {
+    let bench = Bench::new();
+    let setup = "--order natural --sampling 0.25 --sweeps 3 --clocks-per-pattern 8 --blanked 4 --non-differential \
+                 --no-calibration --adc-latency 9";
+    let capture: Vec<&str> = ["capture", "--frames", "2", "--out", "rec.mcap"]
+        .into_iter()
+        .chain(setup.split_whitespace())
+        .collect();
+    bench.run(&capture).succeeded();
+    let info = bench.run(&["info", "rec.mcap", "--json"]).succeeded().json();
+    for (name, value) in [
+        ("order", serde_json::json!("natural")),
+        ("patterns", 256.into()),
+        ("sweeps", 3.into()),
+        ("clocks_per_pattern", 8.into()),
+        ("blanked", 4.into()),
+        ("differential", false.into()),
+        ("adc_latency", 9.into()),
+        ("calibrated", false.into()),
+    ] {
+        assert_eq!(info[name], value, "{name}: {info}");
+    }
+}
+
+#[test]
+fn with_strict_a_warning_is_exit_code_1_and_the_result_is_there() {
+    let bench = Bench::new();
+    let mut bytes = std::fs::read(RECORDING).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x55;
+    bench.write("rec.mcap", &bytes);
+    let export = |out: &str, more: &[&str]| {
+        let export = ["export", "rec.mcap", "--to", "npz", "--out", out];
+        bench.run(&[&export[..], more].concat())
+    };
+    let warned = export("a.npz", &[]).succeeded();
+    assert!(warned.stderr.contains("nirspi: warning: "), "{warned:?}");
+    let strict = export("b.npz", &["--strict"]);
+    assert_eq!((strict.code, &strict.stderr), (Some(1), &warned.stderr), "{strict:?}");
+    assert_eq!(bench.names(), ["a.npz", "b.npz", "rec.mcap"]);
+    // Without a warning nothing changes.
+    std::fs::copy(RECORDING, bench.path("rec.mcap")).unwrap();
+    assert_eq!(export("c.npz", &["--strict"]).succeeded().stderr, "");
+}
+
+fn serve(bench: &Bench, more: &[&str]) -> (Process, CameraAddress) {
+    let virtual_camera = ["virtual", "--listen", "127.0.0.1:0", "--once", "--precompute", "4"];
+    let mut server = bench.start(&[&virtual_camera[..], more].concat());
+    let line = server.says("virtual camera on tcp:");
+    let address = line.split_whitespace().find(|word| word.starts_with("tcp:")).unwrap();
+    let address = address.trim_end_matches(':').parse().unwrap();
+    (server, address)
+}
+
+/// Frames that a camera dropped while its host did not read.
+fn dropped(more: &[&str]) -> u32 {
+    let bench = Bench::new();
+    let (_server, address) = serve(&bench, more);
+    let mut session = address.open(|| Err("no virtual camera here")).unwrap();
+    let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
+    let ignore = &mut IgnorePackets;
+    setup.with_configuration(|c| session.command(request::Configure(c), ignore)).unwrap();
+    session.command(request::Start(RunLength::Continuous), &mut IgnorePackets).unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    // The run may have ended: the camera's time is ahead, and it heard nothing of its host.
+    let _ = session.command(request::Stop, &mut IgnorePackets);
+    session.status(&mut IgnorePackets).unwrap().frames_dropped
+}
+
+#[test]
+fn a_virtual_camera_drops_frames_only_if_it_is_asked_to() {
+    assert_eq!(dropped(&[]), 0);
+    assert!(dropped(&["--drop-when-full"]) > 0);
+}
