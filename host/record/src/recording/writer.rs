@@ -173,3 +173,46 @@ impl Recorder {
         place.remove();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::Recording;
+    use nirspi_recon::Order;
+
+    /// The clock of the system may be set while a run is recorded.
+    #[test]
+    fn a_file_that_follows_another_has_its_clock() {
+        let folder = tempfile::tempdir().unwrap();
+        let identity = CameraIdentity {
+            protocol: 1,
+            firmware: "0.1.0".into(),
+            gateware: "0.4.0".into(),
+            board: "virtual".into(),
+            serial: "1".into(),
+            adc_hz: 125_000_000,
+            adc_bits: 14,
+            wavelength_nm: 1550,
+            capabilities: Vec::new(),
+        };
+        let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
+        let create = |name: &str| {
+            let target = Target::New(folder.path().join(name));
+            Recorder::create(&target, &identity, &setup, None, Some(7)).unwrap()
+        };
+        let (mut first, mut second) = (create("1.mcap"), create("2.mcap"));
+        const HOUR_NS: u64 = 3_600_000_000_000;
+        first.clock.epoch -= HOUR_NS;
+        first.packet(&[1, 0]).unwrap();
+        let place = Part { number: 2, first_frame: 1, follows: Some("1.mcap".into()) };
+        second.follow(Some(&first), &place).unwrap();
+        assert_eq!(second.newest_ns(), first.newest_ns());
+        second.packet(&[2, 0]).unwrap();
+        let path = second.finish(&RunAccount::default()).unwrap();
+        let mut recording = Recording::open(&path).unwrap();
+        assert_eq!(recording.part, Some(place));
+        let later = recording.next().unwrap().unwrap().time_ns - first.newest_ns();
+        assert!(later < HOUR_NS / 2, "{later} ns later");
+        first.discard();
+    }
+}
