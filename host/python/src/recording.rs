@@ -5,7 +5,6 @@ use crate::errors::{of_recording, refused};
 use crate::work::long;
 use nirspi::events;
 use nirspi::recording::Recording;
-use nirspi::tally::Tally;
 use nirspi_wire::{DeviceMessage, open};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
