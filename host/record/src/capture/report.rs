@@ -25,9 +25,7 @@ pub struct CaptureReport<'r> {
     pub frames: LossCounters,
     /// As counted by the camera; `null` if the camera disconnected before it reported.
     pub made: Option<u64>,
-    /// Number of damaged packets of any kind.
-    pub damaged_packets: u64,
-    /// How many of them failed which check.
+    /// How many damaged packets of any kind failed which check. A packet fails one check.
     pub failed_checks: FailedChecks,
     /// Messages that this program does not know.
     pub unknown_packets: u64,
@@ -83,7 +81,6 @@ impl<'r> CaptureReport<'r> {
             bytes: bytes.sum::<io::Result<u64>>()?,
             frames: counters,
             made: captured.made,
-            damaged_packets: captured.failed_checks.packets(),
             failed_checks: captured.failed_checks,
             unknown_packets: captured.unknown_packets,
             repeated: captured.repeated,
