@@ -6,7 +6,7 @@ use super::report::ReportArgs;
 use super::{Usage, address, print, progress, provenance};
 use anyhow::Result;
 use nirspi::capture::{
-    CaptureOptions, CaptureReport, Origin, Preview, Progress, StopCause, observe,
+    CaptureOptions, CaptureReport, Origin, Preview, Progress, Seconds, StopCause, observe,
 };
 use nirspi::exposure::Light;
 use nirspi::files::interrupt;
@@ -19,16 +19,21 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 /// Record frames of a camera into an MCAP file
 ///
-/// The command uses the ADC latency and settling that `nirspi calibrate` or `nirspi selftest` has kept for this camera. If
-/// none are kept, the command measures them on the scene first; if the scene is too dim, the command ends with an error.
-/// Ctrl-C ends the recording and keeps it. A recording that ends because the terminal has gone or the system ends the program
-/// is kept too, says so, and the exit code is 1; `nohup nirspi capture` goes on without its terminal. On a terminal with colours a small image of the newest frames is shown (not
-/// with --quiet, and not if NO_COLOR is set). The exit code is 0 only if nothing is missing: every frame arrived intact, and
-/// the camera reports no fault. Otherwise one line says what is missing, the recording is kept, and the exit code is 1.
+/// The command uses the ADC latency and the settling that `nirspi calibrate` or `nirspi selftest` saved for this camera. If
+/// none are saved, the command measures them on the scene first. If the scene is too dark for this, the command ends with an
+/// error.
+///
+/// Ctrl-C ends the recording and keeps its frames. If the terminal closes or the system ends the program, the frames are kept
+/// too, the recording says what ended it, and the exit code is 1. `nohup nirspi capture` continues after its terminal closes.
+///
+/// On a terminal with colours, the command shows a small image of the newest frames. --quiet and NO_COLOR switch this image
+/// off.
+///
+/// The exit code is 0 only if every frame arrived intact and the camera reports no fault. Otherwise one line says what is
+/// missing, the frames are kept, and the exit code is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap --picture seen/\n\
@@ -43,10 +48,9 @@ pub struct Args {
     frames: Option<u32>,
     #[arg(long, value_name = "TIME", conflicts_with = "frames", allow_hyphen_values = true, help = LIGHT_HELP)]
     light: Option<Light>,
-    /// Seconds to measure, after which the recording ends as if it had all its frames
-    #[arg(long, value_name = "S", conflicts_with_all = ["frames", "light"], allow_hyphen_values = true,
-          value_parser = seconds)]
-    seconds: Option<Duration>,
+    /// Seconds to measure, not counting the calibration. A recording that ends after this time is complete
+    #[arg(long, value_name = "S", conflicts_with_all = ["frames", "light"], allow_hyphen_values = true)]
+    seconds: Option<Seconds>,
     #[command(flatten)]
     setup: SetupArgs,
     #[command(flatten)]
@@ -54,12 +58,12 @@ pub struct Args {
     /// File to record into [default: the first of capture-1.mcap, capture-2.mcap, ... that does not exist]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace a file that exists. The old file stays until the new recording is complete; until then the new recording is
+    /// Replace an existing file. The existing file stays until the new recording is complete. Until then the new recording is
     /// NAME.new.mcap in the same folder
     #[arg(long)]
     overwrite: bool,
-    /// Record into several files, NAME-0001.mcap, NAME-0002.mcap, ..., none of which may exist: the next file begins before a
-    /// file is larger than a size (500MB, 2GB) or when its time is over (90s, 10min, 1h). Each file is a whole recording
+    /// Record into several files, NAME-0001.mcap, NAME-0002.mcap and so on. The next file begins before a file is larger than a
+    /// size (500MB, 2GB) or after a time (90s, 10min, 1h). Each file is a complete recording. None of the names may exist
     #[arg(
         long,
         value_name = "SIZE|TIME",
@@ -67,7 +71,7 @@ pub struct Args {
         allow_hyphen_values = true
     )]
     split: Option<Split>,
-    /// After the recording, make one image of its frames, enlarge and deblur it, and write both into this folder, as
+    /// After the recording, make an image of its frames, enlarge and deblur the image, and write both into this folder, as
     /// `nirspi reconstruct --enhance` does
     #[arg(long, value_name = "DIR")]
     picture: Option<PathBuf>,
@@ -108,14 +112,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         bar.set(progress.counters.total());
         bar.say(format!("{}{seen}", progress.counters));
-        // The time of calibration does not count.
-        let over =
-            seconds.is_some_and(|most| progress.waited.is_some() && progress.elapsed >= most);
-        match stop.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(StopCause::of_program()),
-            false if over => ControlFlow::Break(StopCause::TimeOver),
-            false => ControlFlow::Continue(()),
+        if stop.load(Ordering::Relaxed) {
+            return ControlFlow::Break(StopCause::of_program());
         }
+        seconds.map_or(ControlFlow::Continue(()), |seconds| seconds.watch(progress))
     };
     let mut preview = Preview::new(watch);
     let captured = observe(&mut session, &options, &mut preview);
@@ -141,14 +141,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     }
     Ok(code)
-}
-
-/// A time in seconds.
-fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds = text.parse::<f64>().ok().filter(|seconds| (1e-3..=1e8).contains(seconds));
-    seconds
-        .map(Duration::from_secs_f64)
-        .ok_or_else(|| "expected seconds above 0, like 60".to_owned())
 }
 
 /// Where to record. A name that is taken is refused before the camera is asked for anything.

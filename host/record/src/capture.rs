@@ -20,6 +20,7 @@ mod policy;
 mod preview;
 mod report;
 mod run;
+mod seconds;
 
 pub use flat_field::{FlatFieldError, measure_dark, measure_flat_field};
 pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};
@@ -27,6 +28,7 @@ pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};
 pub use preview::Preview;
 pub use report::CaptureReport;
 pub use run::Run;
+pub use seconds::{Seconds, SecondsError};
 
 use crate::recording::Target;
 use nirspi_camera::account::{FailedChecks, LossCounters};
