@@ -4,15 +4,18 @@
 
 use nirspi::check::{Check, Verdict};
 use nirspi::link::{Link, Received};
-use nirspi::selftest::{LinkDemands, SelfTest, run};
+use nirspi::selftest::{LinkDemands, STAGES, SelfTest, run};
 use nirspi::session::Session;
 use nirspi_hdl_model::Lines;
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{LedArray, Scene};
 use nirspi_virtual::{MemoryLink, OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics};
 use nirspi_wire::register::{Register, mode};
-use std::collections::HashMap;
+use nirspi_wire::{Answer, DeviceMessage, Reply, Status, encode, open};
+use std::collections::{HashMap, HashSet};
 use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// A white sheet across the whole field.
@@ -294,6 +297,163 @@ fn a_link_that_loses_frames_is_seen_and_the_camera_is_not_blamed() {
         "link losses",
         &[": 0 lost in the FPGA", "0 dropped by the firmware", "on the link"],
     );
+}
+
+/// An FPGA on a busy computer: its simulation takes much longer than the time that it simulates.
+struct Busy {
+    inner: OpticalFpga,
+    is_busy: Arc<AtomicBool>,
+}
+
+impl FpgaBus for Busy {
+    fn read(&mut self, address: u16) -> Result<u32, BusError> {
+        self.inner.read(address)
+    }
+    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
+        self.inner.write(address, value)
+    }
+    fn frame_ready(&mut self) -> bool {
+        self.inner.frame_ready()
+    }
+    fn raw_ready(&mut self) -> bool {
+        self.inner.raw_ready()
+    }
+    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
+        self.inner.frame()
+    }
+    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
+        self.inner.raw()
+    }
+}
+
+impl SimulatedFpga for Busy {
+    fn advance(&mut self, clocks: u32) {
+        if self.is_busy.load(Ordering::Relaxed) {
+            // 25 ms for a sweep of 0.08 ms.
+            std::thread::sleep(Duration::from_micros(u64::from(clocks) * 5 / 2));
+        }
+        self.inner.advance(clocks);
+    }
+    fn clock(&self) -> u64 {
+        self.inner.clock()
+    }
+    fn running(&self) -> bool {
+        self.inner.running()
+    }
+    fn set_interlock(&mut self, closed: bool) {
+        self.inner.set_interlock(closed);
+    }
+}
+
+/// Once the pace came from the clock of this computer: frames of the second run then took minutes, no frame
+/// came, and a sound camera failed.
+#[test]
+fn a_busy_computer_is_no_fault_of_the_link() {
+    let is_busy = Arc::new(AtomicBool::new(false));
+    let fpga = Busy { inner: optics().fpga(1).unwrap(), is_busy: Arc::clone(&is_busy) };
+    let mut session = Session::open(Box::new(plugged(fpga))).unwrap();
+    let demands = LinkDemands { min_frames_per_s: 0.0, duration: Duration::from_millis(50) };
+    let mut begin = |stage| is_busy.store(STAGES[stage] == "link throughput", Ordering::Relaxed);
+    let found = run(&mut session, demands, &mut begin).unwrap();
+    assert!(found.passed(), "{:#?}", failures(&found));
+    let losses = found.checks.iter().find(|check| check.name() == "link losses").unwrap();
+    assert!(losses.note().contains("frames/s"), "{losses:?}");
+}
+
+/// A link that has no room for one frame of some of the link's runs, as if this computer stood still for a
+/// moment. The camera says so in its status.
+struct NoRoom<L> {
+    inner: L,
+    is_link: Arc<AtomicBool>,
+    /// The runs of the check of the link, in order.
+    runs: Vec<u16>,
+    /// Whether the run of this place in their order has no room.
+    has_none: fn(usize) -> bool,
+    chunk: Vec<u8>,
+    packet: Vec<u8>,
+    ready: Vec<u8>,
+    dropped: HashSet<u16>,
+}
+
+impl<L: Link> NoRoom<L> {
+    /// The packet as it comes out of the link; nothing if there was no room for it.
+    fn changed(&mut self, packet: Vec<u8>) -> Vec<u8> {
+        let mut bytes = packet.clone();
+        bytes.pop();
+        match open::<DeviceMessage<'_>>(&mut bytes) {
+            Ok(DeviceMessage::Frame(frame)) if self.is_link.load(Ordering::Relaxed) => {
+                if !self.runs.contains(&frame.run) {
+                    self.runs.push(frame.run);
+                }
+                let is_dropped = (self.has_none)(self.runs.len() - 1)
+                    && frame.sequence > 0
+                    && self.dropped.insert(frame.run);
+                if is_dropped { Vec::new() } else { packet }
+            }
+            Ok(DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Status(status)) }))
+                if self.dropped.contains(&status.run) =>
+            {
+                let status = Answer::Status(Status { frames_dropped: 1, ..status });
+                let reply = DeviceMessage::Reply(Reply { id, outcome: Ok(status) });
+                encode(&reply, &mut [0; 4096]).unwrap().to_vec()
+            }
+            _ => packet,
+        }
+    }
+}
+
+impl<L: Link> Link for NoRoom<L> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.inner.send(bytes)
+    }
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Received> {
+        if self.ready.is_empty() {
+            match self.inner.receive(&mut self.chunk, timeout)? {
+                Received::Bytes(length) => {
+                    for at in 0..length {
+                        self.packet.push(self.chunk[at]);
+                        if self.chunk[at] == 0 {
+                            let packet = std::mem::take(&mut self.packet);
+                            let changed = self.changed(packet);
+                            self.ready.extend(changed);
+                        }
+                    }
+                }
+                other => return Ok(other),
+            }
+        }
+        let length = self.ready.len().min(buffer.len());
+        buffer[..length].copy_from_slice(&self.ready[..length]);
+        self.ready.drain(..length);
+        Ok(if length == 0 { Received::Nothing } else { Received::Bytes(length) })
+    }
+}
+
+fn test_without_room(has_none: fn(usize) -> bool) -> SelfTest {
+    let is_link = Arc::new(AtomicBool::new(false));
+    let link = NoRoom {
+        inner: MemoryLink::new(optics().camera(1).unwrap()),
+        is_link: Arc::clone(&is_link),
+        runs: Vec::new(),
+        has_none,
+        chunk: vec![0; 1 << 16],
+        packet: Vec::new(),
+        ready: Vec::new(),
+        dropped: HashSet::new(),
+    };
+    let mut session = Session::open(Box::new(link)).unwrap();
+    let demands = LinkDemands { min_frames_per_s: 0.0, duration: Duration::from_millis(50) };
+    let mut begin = |stage| is_link.store(STAGES[stage] == "link throughput", Ordering::Relaxed);
+    run(&mut session, demands, &mut begin).unwrap()
+}
+
+#[test]
+fn frames_without_room_are_asked_for_again_at_a_slower_pace() {
+    let found = test_without_room(|run| run == 1);
+    assert!(found.passed(), "{:#?}", failures(&found));
+    assert!(note(&found, "link losses").contains("the link had no room"), "{found:#?}");
+    let found = test_without_room(|run| run > 0);
+    only(&found, "link losses", &["1 dropped by the firmware", "0 on the link", "had no room"]);
 }
 
 #[test]

@@ -8,6 +8,11 @@ use std::time::{Duration, Instant};
 
 /// Interval of the host's messages while it only listens.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
+/// The least frames of a run that only counts frames. A simulated camera on a busy computer may need
+/// longer for them than the run should last.
+const LEAST_FRAMES: u64 = 8;
+/// The longest time to wait for these frames.
+const LONGEST: Duration = Duration::from_secs(20);
 
 /// A received frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,23 +86,40 @@ pub struct Stream {
     pub elapsed: Duration,
     /// The camera's own status after the run.
     pub status: Status,
+    /// The camera's times of the first frame and the newest one.
+    device_us: Option<(u64, u64)>,
+}
+
+impl Stream {
+    /// Frames that arrived in a second of the camera's clock; `None` if there are too few to say.
+    pub fn frames_per_device_s(&self) -> Option<f64> {
+        let (first, last) = self.device_us?;
+        let frames = self.tally.arrived().saturating_sub(1);
+        let seconds = last.saturating_sub(first) as f64 * 1e-6;
+        (frames > 0 && seconds > 0.0).then(|| frames as f64 / seconds)
+    }
 }
 
 struct Counter {
     tally: Tally,
     bytes: u64,
     last_packet: Instant,
+    device_us: Option<(u64, u64)>,
 }
 
 impl Listener for Counter {
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
         self.last_packet = Instant::now();
         self.bytes += raw.len() as u64;
-        self.tally.packet(content);
+        if self.tally.packet(content) {
+            let now = self.tally.device_time_us();
+            let (first, _) = self.device_us.unwrap_or((now, now));
+            self.device_us = Some((first, now));
+        }
     }
 }
 
-/// Runs the camera for `duration`, and counts.
+/// Runs the camera for `duration`, or longer until a few frames have arrived, and counts.
 pub fn stream(
     session: &mut Session,
     setup: &MeasurementSetup,
@@ -107,10 +129,14 @@ pub fn stream(
     let run = session.status(&mut IgnorePackets)?.run.wrapping_add(1);
     let started = Instant::now();
     let tally = Tally::new(setup, Some(run));
-    let mut counter = Counter { tally, bytes: 0, last_packet: started };
+    let mut counter = Counter { tally, bytes: 0, last_packet: started, device_us: None };
     session.command(request::Start(RunLength::Continuous), &mut counter)?;
     let (mut kept_alive, mut kept_alive_us) = (started, 0);
-    while started.elapsed() < duration && !counter.tally.has_ended() {
+    let has_enough = |tally: &Tally| {
+        let least = if tally.arrived() < LEAST_FRAMES { LONGEST } else { duration };
+        started.elapsed() >= least.max(duration)
+    };
+    while !has_enough(&counter.tally) && !counter.tally.has_ended() {
         session.listen(Duration::from_millis(20), &mut counter)?;
         // The time of a simulated camera may run faster than the host's, and the camera measures
         // the host's silence.
@@ -135,5 +161,6 @@ pub fn stream(
     if !counter.tally.has_ended() {
         counter.tally.end(status.frames_made);
     }
-    Ok(Stream { tally: counter.tally, bytes, elapsed, status })
+    let Counter { tally, device_us, .. } = counter;
+    Ok(Stream { tally, bytes, elapsed, status, device_us })
 }

@@ -29,7 +29,6 @@ impl FromStr for Seconds {
 
 impl Seconds {
     /// A break if the time is over. A capture that ends so is whole, as if it had all its frames.
-    #[must_use]
     pub fn watch(self, progress: &Progress) -> ControlFlow<StopCause> {
         match progress.waited {
             Some(_) if progress.elapsed >= self.0 => ControlFlow::Break(StopCause::TimeOver),
