@@ -356,8 +356,11 @@ fn a_busy_computer_is_no_fault_of_the_link() {
     let mut begin = |stage| is_busy.store(STAGES[stage] == "link throughput", Ordering::Relaxed);
     let found = run(&mut session, demands, &mut begin).unwrap();
     assert!(found.passed(), "{:#?}", failures(&found));
-    let losses = found.checks.iter().find(|check| check.name() == "link losses").unwrap();
-    assert!(losses.note().contains("frames/s"), "{losses:?}");
+    // `of 8 at 6104 frames/s`: by the camera's clock, and enough frames to see a loss.
+    let told = note(&found, "link losses");
+    let mut numbers = told.split(' ').filter_map(|word| word.parse::<u64>().ok());
+    let (frames, pace) = (numbers.next().unwrap(), numbers.next().unwrap());
+    assert!(frames >= 8 && (3000..12_000).contains(&pace), "{told}");
 }
 
 /// A link that has no room for one frame of some of the link's runs, as if this computer stood still for a
