@@ -52,6 +52,17 @@ fn bytes_that_would_become_gigabytes_of_numbers_are_refused_before_they_are_read
     }
 }
 
+/// h5py wrote the file, of `np.float16`.
+#[cfg(feature = "hdf5")]
+#[test]
+fn numbers_of_half_precision_in_hdf5_are_named_with_what_to_save_instead() {
+    let (_folder, path) = file("half.h5", include_bytes!("../small/float16.h5"));
+    let told =
+        line(&Fields::open(&path, false).unwrap().read("y", |_| Ok(())).unwrap_err(), "half.h5");
+    assert!(told.contains("`y` is an array of floating-point numbers of 2 bytes"), "{told}");
+    assert!(told.ends_with("expected 4 or 8 bytes: save it as float32"), "{told}");
+}
+
 #[test]
 fn what_is_no_array_of_numbers_is_named_only_when_it_is_asked_for() {
     let without_text = ["level73.mat", "level4.mat"];
