@@ -268,6 +268,18 @@ mod tests {
         assert!(begun.elapsed() < std::time::Duration::from_secs(60));
     }
 
+    /// Once a camera with precomputed frames had an older gateware than one without.
+    #[test]
+    fn identity_and_version_are_those_of_the_model_before_and_in_a_run() {
+        let mut fpga = fpga(1);
+        let names = [Register::Identity, Register::Version].map(Register::address);
+        let of_model = names.map(|address| fpga.model.read(address).unwrap());
+        assert_eq!(names.map(|address| fpga.read(address).unwrap()), of_model);
+        fpga.write(Register::Control.address(), control::START).unwrap();
+        assert!(fpga.run.is_some());
+        assert_eq!(names.map(|address| fpga.read(address).unwrap()), of_model);
+    }
+
     #[test]
     fn short_frames_are_repeated() {
         let mut fpga = fpga(1);

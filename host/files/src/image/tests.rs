@@ -229,3 +229,21 @@ fn a_picture_of_a_palette_that_would_take_too_much_memory_is_refused_before_it_t
     let told = of_edge(16);
     assert!(!told.contains("too large"), "{told}");
 }
+
+/// The pixels of the file are missing, which only a decoder notices.
+#[test]
+fn a_picture_of_a_wrong_size_is_refused_before_a_pixel_is_decoded() {
+    let mut bytes = Vec::new();
+    let mut encoder = ::png::Encoder::new(&mut bytes, 8000, 8000);
+    encoder.set_color(::png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_chunk(::png::chunk::IDAT, &[]).unwrap();
+    let (_folder, path) = file("scene.png", &bytes);
+    let fits = |(width, height)| match width {
+        8000 => Err(FileError::kind(&path, format!("{width} x {height}"), "64 x 64")),
+        _ => Ok(()),
+    };
+    let told = line(&read_grey_if(&path, fits).map(|_| ()).unwrap_err(), "scene.png");
+    assert!(told.contains("found 8000 x 8000, expected 64 x 64"), "{told}");
+    let told = line(&read_grey(&path).map(|_| ()).unwrap_err(), "scene.png");
+    assert!(!told.contains("8000"), "{told}");
+}
