@@ -32,7 +32,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 const EXPECTED: &str = "expected calibrate DATA FILE [WEIGHTS] or judge DATA FILE OUT [WEIGHTS]";
 const SEED: u64 = 1;
 /// The most images of each stack of characters, for calibrating and for judging.
-const COUNTS: [usize; 2] = [165, 30];
+const COUNTS: [usize; 2] = [55, 30];
 /// Side of a part of a scene.
 const SIDE: usize = 64;
 
