@@ -87,7 +87,7 @@ impl Row {
     /// Whether the method knows nothing but the measurements and a formula.
     #[must_use]
     pub fn is_classical(&self) -> bool {
-        ![Method::PRIOR, Method::AUTO].map(|method| method.argument()).contains(&self.method)
+        ![Method::PRIOR, Method::AUTO].map(Method::argument).contains(&self.method)
     }
 }
 
