@@ -108,6 +108,7 @@ REFUSED = [
     (lambda: ns.enhance(np.full((32, 32), np.nan)), "expected 0 to 1"),
     (lambda: ns.enhance(np.zeros((32, 32)), blur_px=99), "blur_px is 99, expected 0 to 16"),
     (lambda: ns.enhance(np.zeros((32, 32)), steps=0), "steps is 0"),
+    (lambda: ns.enhance(np.zeros((32, 32)), steps=2**70), "a whole number from 0 to 4294967295"),
     (lambda: ns.enhance(np.zeros((0, 32, 32))), "expected (..., n, n)"),
     (lambda: ns.enhance(ns.Image(np.zeros((32, 32)))), "no light in the image"),
     (lambda: ns.enhance(ns.Image(np.ones((32, 32))), seed=3), "options beside an Image"),
