@@ -1,6 +1,6 @@
 //! Options that change what is measured or what a script learns: each is seen in the file, the camera or the exit code.
 
-use crate::bench::{Bench, Process};
+use crate::bench::{Bench, Measured, Process};
 use nirspi::address::CameraAddress;
 use nirspi::session::{IgnorePackets, request};
 use nirspi::setup::MeasurementSetup;
@@ -86,4 +86,28 @@ fn dropped(more: &[&str]) -> u32 {
 fn a_virtual_camera_drops_frames_only_if_it_is_asked_to() {
     assert_eq!(dropped(&[]), 0);
     assert!(dropped(&["--drop-when-full"]) > 0);
+}
+
+#[test]
+fn images_of_a_share_of_the_patterns_are_judged_by_the_measurement_that_was_named() {
+    let bench = Bench::new();
+    let mut measured = Measured::new(8);
+    bench.write("in.npz", &measured.npz());
+    let most = measured.y.iter().fold(0.0_f32, |most, y| most.max(y.abs()));
+    let noise = (0..).map(|at| 0.02 * most * ((at * 37 % 23) as f32 / 11.0 - 1.0));
+    measured.y.iter_mut().zip(noise).for_each(|(y, noise)| *y += noise);
+    bench.write("again.npz", &measured.npz());
+    measured.y.reverse();
+    bench.write("other.npz", &measured.npz());
+    let judged = |more: &[&str]| {
+        let sampling = ["eval", "sampling", "in.npz", "--sampling", "50%", "--orders", "zig-zag"];
+        bench.run(&[&sampling[..], &["--json"], more].concat())
+    };
+    let alone = judged(&[]).succeeded().json();
+    let against = judged(&["--against", "again.npz"]).succeeded().json();
+    assert_eq!(alone["judged_by"], "same_readings");
+    assert_ne!(against["judged_by"], "same_readings");
+    let psnr = |report: &serde_json::Value| report["rows"][0]["psnr_db"].as_f64().unwrap();
+    assert!((psnr(&against) - psnr(&alone)).abs() > 0.01, "{alone} {against}");
+    judged(&["--against", "other.npz"]).failed(1, &["do not show the same scene"]);
 }
