@@ -71,6 +71,8 @@ struct Splitting {
     number: u32,
     /// The frames of the current file.
     tally: Tally,
+    /// Whether the newest packet was a frame that arrived in order.
+    is_after_frame: bool,
     /// When the current file began, in ns of the host's clock.
     began_ns: u64,
     next: Next,
@@ -124,6 +126,7 @@ impl RunRecorder {
             tally: opening.tally(0),
             opening: Arc::new(opening),
             number: 1,
+            is_after_frame: false,
             began_ns: current.newest_ns(),
             next: Next::Later,
             closing: None,
@@ -138,16 +141,28 @@ impl RunRecorder {
         self.current.queued()
     }
 
-    /// Appends one packet as received.
+    /// Appends one packet as received. The next file may begin with a frame or a damaged packet that
+    /// directly follows a frame that arrived in order; so the end of a run alone is in no file.
     ///
     /// # Errors
     /// If the disk is full or gone.
-    pub(super) fn packet(&mut self, raw: &[u8]) -> io::Result<()> {
+    pub(super) fn packet(
+        &mut self,
+        raw: &[u8],
+        content: &Result<DeviceMessage<'_>, PacketError>,
+    ) -> io::Result<()> {
+        let Self { current, splitting } = self;
+        if let Some(splitting) = splitting
+            && mem::take(&mut splitting.is_after_frame)
+            && matches!(content, Ok(DeviceMessage::Frame(_)) | Err(_))
+        {
+            splitting.go_on(current)?;
+        }
         self.current.packet(raw)
     }
 
     /// Writes what the newest packet means. `tally` has counted the packet, and `received` says whether
-    /// the packet was a frame that arrived in order. After such a frame the next file may begin.
+    /// the packet was a frame that arrived in order.
     ///
     /// # Errors
     /// If the disk is full or gone.
@@ -158,10 +173,11 @@ impl RunRecorder {
         received: bool,
     ) -> io::Result<()> {
         self.current.heard(content, tally)?;
-        let Self { current, splitting } = self;
-        let Some(splitting) = splitting else { return Ok(()) };
-        splitting.tally.packet(content);
-        if received { splitting.go_on(current) } else { Ok(()) }
+        if let Some(splitting) = &mut self.splitting {
+            splitting.tally.packet(content);
+            splitting.is_after_frame = received;
+        }
+        Ok(())
     }
 
     /// Hands the received packets to the disk's queue, unless the last flush is recent.

@@ -110,7 +110,7 @@ impl Listener for Packets<'_> {
         if content.is_ok() {
             run.last_intact = now;
         }
-        run.record(|recorder| recorder.packet(raw));
+        run.record(|recorder| recorder.packet(raw, content));
         let before = run.tally.arrived();
         let received = run.tally.packet(content);
         if let (Some(recorder), None) = (&mut run.recorder, &run.recorder_error) {

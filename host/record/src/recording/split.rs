@@ -2,8 +2,8 @@
 //!
 //! # Invariant
 //! Each file of a run is a whole recording, which begins directly after a frame that arrived in
-//! order. So a gap in the frames, and the damaged packets in the gap, are in the same file, and the
-//! files together have each frame once (`host/tests/split.rs`).
+//! order, with the next frame or a damaged packet. So a gap in the frames, and the damaged packets in
+//! the gap, are in the same file, and the files together have each frame once (`host/tests/split.rs`).
 
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
