@@ -100,16 +100,18 @@ depth_m = np.frombuffer(maps[0][1].data, "<f4").reshape(32, 32)
 assert maps[0][1].encoding == "32FC1" and 0.25 < np.median(depth_m) < 0.35, np.median(depth_m)
 print(f"depth: {len(maps)} maps, median {np.median(depth_m):.3f} m (simulated)")
 
-# Enhanced images are those of `reconstruct --enhance`, each with its spread.
+# Enhanced images are those of `reconstruct --enhance`, each with its spread and its intervals.
 run("export", "rec.mcap", "--to", "mcap", "--enhance", "--out", "enhanced.mcap")
 run("reconstruct", "rec.mcap", "--enhance", "--out", "enhanced", "--no-flat-field")
 made = {c.topic: m for _, c, _, m in messages("enhanced.mcap")[0]}
-enhanced, spread = (np.frombuffer(made[t].data, "<f4").reshape(64, 64) for t in ("/enhanced", "/spread"))
-# The noise of an exported recording's frames is not handed on yet, so there is no interval.
-assert "/interval" not in made
+topics = ("/enhanced", "/spread", "/interval")
+enhanced, spread, interval = (np.frombuffer(made[topic].data, "<f4").reshape(64, 64) for topic in topics)
 assert np.array_equal(enhanced, np.load(folder / "enhanced" / "enhanced.npy").reshape(64, 64))
 assert 0 < spread.max() < 0.5 and spread.min() >= 0, (spread.min(), spread.max())
+# No half-width is below what a bench can hold.
+assert 0.004 <= interval.min() and interval.max() <= 1, (interval.min(), interval.max())
 print(f"spread: median {np.median(spread):.4f}, greatest {spread.max():.3f} of white (simulated)")
+print(f"interval: median {np.median(interval):.4f}, greatest {interval.max():.3f} of white (simulated)")
 
 
 def image_in_rerun(name):
