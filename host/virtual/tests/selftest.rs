@@ -372,6 +372,8 @@ struct NoRoom<L> {
     runs: Vec<u16>,
     /// Whether the run of this place in their order has no room.
     has_none: fn(usize) -> bool,
+    /// Counts the missing frame in the status.
+    counted: fn(Status) -> Status,
     chunk: Vec<u8>,
     packet: Vec<u8>,
     ready: Vec<u8>,
@@ -396,7 +398,7 @@ impl<L: Link> NoRoom<L> {
             Ok(DeviceMessage::Reply(Reply { id, outcome: Ok(Answer::Status(status)) }))
                 if self.dropped.contains(&status.run) =>
             {
-                let status = Answer::Status(Status { frames_dropped: 1, ..status });
+                let status = Answer::Status((self.counted)(status));
                 let reply = DeviceMessage::Reply(Reply { id, outcome: Ok(status) });
                 encode(&reply, &mut [0; 4096]).unwrap().to_vec()
             }
@@ -432,13 +434,14 @@ impl<L: Link> Link for NoRoom<L> {
     }
 }
 
-fn test_without_room(has_none: fn(usize) -> bool) -> SelfTest {
+fn test_without_room(has_none: fn(usize) -> bool, counted: fn(Status) -> Status) -> SelfTest {
     let is_link = Arc::new(AtomicBool::new(false));
     let link = NoRoom {
         inner: MemoryLink::new(optics().camera(1).unwrap()),
         is_link: Arc::clone(&is_link),
         runs: Vec::new(),
         has_none,
+        counted,
         chunk: vec![0; 1 << 16],
         packet: Vec::new(),
         ready: Vec::new(),
@@ -452,11 +455,15 @@ fn test_without_room(has_none: fn(usize) -> bool) -> SelfTest {
 
 #[test]
 fn frames_without_room_are_asked_for_again_at_a_slower_pace() {
-    let found = test_without_room(|run| run == 1);
-    assert!(found.passed(), "{:#?}", failures(&found));
-    assert!(note(&found, "link losses").contains("the link had no room"), "{found:#?}");
-    let found = test_without_room(|run| run > 0);
-    only(&found, "link losses", &["1 dropped by the firmware", "0 on the link", "had no room"]);
+    let dropped: fn(Status) -> Status = |status| Status { frames_dropped: 1, ..status };
+    let lost: fn(Status) -> Status = |status| Status { fpga_frames_lost: 1, ..status };
+    for (counted, words) in [(dropped, "1 dropped by the firmware"), (lost, "1 lost in the FPGA")] {
+        let found = test_without_room(|run| run == 1, counted);
+        assert!(found.passed(), "{:#?}", failures(&found));
+        assert!(note(&found, "link losses").contains("came too late"), "{found:#?}");
+        let found = test_without_room(|run| run > 0, counted);
+        only(&found, "link losses", &[words, "0 on the link", "came too late"]);
+    }
 }
 
 #[test]
