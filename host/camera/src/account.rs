@@ -284,7 +284,7 @@ impl LossAccount {
     }
 
     /// Number of the next frame in order. The account has the frames from the first one to the one
-    /// before this number; the account of a whole run has so many frames.
+    /// before this number. For a whole run this is the number of frames in the account.
     #[must_use]
     pub fn accounted(&self) -> u64 {
         self.expected

@@ -64,8 +64,10 @@ pub fn check(session: &mut Session, demands: LinkDemands) -> Result<Vec<Check>, 
     let sweeps_per_s = 1e9 / setup(1).frame_ns();
     let carried_per_s = fastest.frames_per_device_s().unwrap_or(sweeps_per_s);
     let most_sweeps = MAX_SUMMED_SAMPLES / u32::from(CLOCKS_PER_PATTERN - BLANKED);
-    let mut sweeps = (sweeps_per_s / (PACE * carried_per_s)).ceil().max(1.0) as u32;
-    let mut paced = stream(session, &setup(sweeps.min(most_sweeps)), demands.duration)?;
+    let wanted = (sweeps_per_s / (PACE * carried_per_s)).ceil() as u32;
+    let mut sweeps = wanted.clamp(1, most_sweeps);
+    let pace = |sweeps: u32| sweeps_per_s / f64::from(sweeps);
+    let mut paced = stream(session, &setup(sweeps), demands.duration)?;
     let mut too_fast = String::new();
     for _ in 1..RUNS {
         // The FPGA loses frames that the firmware fetches too late.
@@ -73,16 +75,14 @@ pub fn check(session: &mut Session, demands: LinkDemands) -> Result<Vec<Check>, 
         if late == 0 || sweeps >= most_sweeps {
             break;
         }
-        let pace = sweeps_per_s / f64::from(sweeps.min(most_sweeps));
-        too_fast = format!("; at {pace:.0} frames/s some frames came too late");
-        sweeps *= 2;
-        paced = stream(session, &setup(sweeps.min(most_sweeps)), demands.duration)?;
+        too_fast = format!("; at {:.0} frames/s some frames came too late", pace(sweeps));
+        sweeps = (2 * sweeps).min(most_sweeps);
+        paced = stream(session, &setup(sweeps), demands.duration)?;
     }
     let counters = paced.tally.account().counters();
     let missing = counters.total() - counters.received;
     let status = paced.status;
-    let pace = sweeps_per_s / f64::from(sweeps.min(most_sweeps));
-    let mut note = format!("of {} at {pace:.0} frames/s", counters.total());
+    let mut note = format!("of {} at {:.0} frames/s", counters.total(), pace(sweeps));
     if missing > 0 {
         let (fpga, firmware) = (status.fpga_frames_lost, status.frames_dropped);
         let bus = status.fpga_frames_corrupt;
