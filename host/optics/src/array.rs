@@ -8,13 +8,17 @@
 //! (`lines_light_the_leds_of_the_walsh_pattern_they_stand_for` in `host/optics/tests/array.rs`). A
 //! line that is stuck, swapped or inverted therefore shows in the light as with real hardware.
 
-use crate::{Footprint, LEDS, SIDE};
+use crate::{Footprint, LEDS, Light, SIDE};
 use foldhash::fast::FixedState;
 use std::collections::HashMap;
 
 /// The most line states kept. A sweep has 1024 patterns and their complements. Twice that number
 /// leaves room for an injected fault, and limits the table for any other driver.
 const MEMO_LIMIT: usize = 4 * LEDS;
+
+/// LEDs along a side of a tile, which has a supply of its own.
+const TILE: usize = 8;
+const TILES: usize = SIDE / TILE;
 
 /// The array in front of one scene. Computes the detected light of line states.
 #[derive(Debug, Clone)]
@@ -23,12 +27,43 @@ pub struct LedArray {
     electrons: Vec<f32>,
     /// Light of each LED divided by that of an ideal LED; `None` if all LEDs are ideal.
     gains: Option<Vec<f32>>,
-    /// Light of each row for a row line of 0 and of 1, by the state of the column lines. A sweep
-    /// has few such states.
-    rows: HashMap<u32, [[f64; 2]; SIDE], FixedState>,
+    /// Share of its light that a tile loses if all of its LEDs are lit.
+    tile_sag: f64,
+    /// Light of lit LEDs, and of LEDs that are switched, on which no supply sags.
+    lit: Sums,
+    switched: Sums,
+    last: Option<(u64, f32)>,
+    /// The lines of the clock before, and whether they were enabled.
+    before: (u64, bool),
+    /// The light of enabled lines after other enabled lines, by the later ones: a sweep has the same ones before.
+    steps: HashMap<u64, Step, FixedState>,
+    /// The light of `before`.
+    held: Option<f32>,
+}
+
+/// Enabled lines that came after others.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    before: u64,
+    light: Light,
+}
+
+/// Light of line states, remembered.
+#[derive(Debug, Clone, Default)]
+struct Sums {
+    /// Light of each row and each of its tiles for a row line of 0 and of 1, by the state of the column lines. A sweep has
+    /// few such states.
+    rows: HashMap<u32, RowSums, FixedState>,
     /// Bit r of the rows in the high half, bit c of the columns in the low half.
     memo: HashMap<u64, f32, FixedState>,
-    last: Option<(u64, f32)>,
+}
+
+/// For each row, its light for a row line of 0 and of 1.
+#[derive(Debug, Clone)]
+struct RowSums {
+    whole: [[f64; 2]; SIDE],
+    /// By tile from left to right; only of a supply that sags.
+    tiles: Option<Box<[[[f64; 2]; TILES]; SIDE]>>,
 }
 
 impl LedArray {
@@ -41,9 +76,13 @@ impl LedArray {
         Self {
             electrons: electrons.collect(),
             gains: None,
-            rows: HashMap::default(),
-            memo: HashMap::default(),
+            tile_sag: 0.0,
+            lit: Sums::default(),
+            switched: Sums::default(),
             last: None,
+            before: (0, false),
+            steps: HashMap::default(),
+            held: None,
         }
     }
 
@@ -58,6 +97,15 @@ impl LedArray {
         self
     }
 
+    /// The same array with a supply for each tile of 8 x 8 LEDs that gives way: the LEDs of a tile lose the share `sag *
+    /// lit / 64` of their light while `lit` of them are lit.
+    #[must_use]
+    pub fn with_tile_sag(mut self, sag: f64) -> Self {
+        self.tile_sag = sag;
+        self.forget();
+        self
+    }
+
     /// The same array after a change in front of it. `reflectance` is what each LED's spot now
     /// sees, 32 x 32, row-major.
     pub fn relight(&mut self, reflectance: &[f32], electrons_per_led: f64) {
@@ -67,9 +115,15 @@ impl LedArray {
         for (electrons, gain) in self.electrons.iter_mut().zip(self.gains.iter().flatten()) {
             *electrons *= gain;
         }
-        self.rows.clear();
-        self.memo.clear();
+        self.forget();
+    }
+
+    fn forget(&mut self) {
+        self.lit.clear();
+        self.switched.clear();
+        self.steps.clear();
         self.last = None;
+        self.held = None;
     }
 
     /// Settled light in electrons per ADC sample. Bit r of `rows` and bit c of `cols` are the lines
@@ -84,31 +138,118 @@ impl LedArray {
         }
     }
 
+    /// The light of one clock with these lines, with the light of the LEDs that were switched since the last call.
+    #[inline]
+    pub fn step(&mut self, rows: u32, cols: u32, enabled: bool) -> Light {
+        let lines = u64::from(rows) << 32 | u64::from(cols);
+        match self.held {
+            Some(settled) if self.before == (lines, enabled) => settled.into(),
+            _ => self.switch(rows, cols, enabled),
+        }
+    }
+
+    /// The light of a clock in which lines or enable have changed, or the light of all lines.
+    fn switch(&mut self, rows: u32, cols: u32, enabled: bool) -> Light {
+        let now = u64::from(rows) << 32 | u64::from(cols);
+        let (before, was_enabled) = std::mem::replace(&mut self.before, (now, enabled));
+        let both = enabled && was_enabled;
+        let light = match self.steps.get(&now) {
+            Some(step) if both && step.before == before => step.light,
+            _ => {
+                let light = self.switched_light(before, was_enabled, now, enabled);
+                if both {
+                    if self.steps.len() >= MEMO_LIMIT {
+                        self.steps.clear();
+                    }
+                    self.steps.insert(now, Step { before, light });
+                }
+                light
+            }
+        };
+        self.held = Some(light.settled);
+        light
+    }
+
+    fn switched_light(&mut self, before: u64, was_enabled: bool, now: u64, enabled: bool) -> Light {
+        let [(rows, cols), (rows_before, cols_before)] =
+            [now, before].map(|lines| ((lines >> 32) as u32, lines as u32));
+        // The lines rise and fall whether or not the LEDs are enabled.
+        let lines_risen = now.count_ones() as i8 - before.count_ones() as i8;
+        let switched = match (was_enabled, enabled) {
+            (false, false) => 0.0,
+            (false, true) => self.switched.of(&self.electrons, rows, cols, 0.0),
+            (true, false) => self.switched.of(&self.electrons, rows_before, cols_before, 0.0),
+            // An LED has changed where exactly one of its lines has, which is again a pattern.
+            (true, true) => {
+                let (rows, cols) = (!(rows ^ rows_before), cols ^ cols_before);
+                self.switched.of(&self.electrons, rows, cols, 0.0)
+            }
+        };
+        Light { settled: self.light(rows, cols, enabled), switched, lines_risen }
+    }
+
     /// The light of lines that have changed.
     fn changed(&mut self, rows: u32, cols: u32) -> f32 {
         let lines = u64::from(rows) << 32 | u64::from(cols);
-        if self.memo.len() >= MEMO_LIMIT {
-            self.memo.clear();
-            self.rows.clear();
-        }
-        let (electrons, by_row) = (&self.electrons, &mut self.rows);
-        let light = *self.memo.entry(lines).or_insert_with(|| {
-            let sums = by_row.entry(cols).or_insert_with(|| row_sums(electrons, cols));
-            let lit = sums.iter().enumerate().map(|(row, sum)| sum[(rows >> row & 1) as usize]);
-            lit.sum::<f64>() as f32
-        });
+        let light = self.lit.of(&self.electrons, rows, cols, self.tile_sag);
         self.last = Some((lines, light));
         light
     }
 }
 
+impl Sums {
+    fn clear(&mut self) {
+        self.rows.clear();
+        self.memo.clear();
+    }
+
+    /// The light of these lines, enabled.
+    fn of(&mut self, electrons: &[f32], rows: u32, cols: u32, tile_sag: f64) -> f32 {
+        let lines = u64::from(rows) << 32 | u64::from(cols);
+        if self.memo.len() >= MEMO_LIMIT {
+            self.clear();
+        }
+        let by_row = &mut self.rows;
+        *self.memo.entry(lines).or_insert_with(|| {
+            let sums = by_row.entry(cols).or_insert_with(|| row_sums(electrons, cols, tile_sag));
+            let state = |row: usize| (rows >> row & 1) as usize;
+            let lit = sums.whole.iter().enumerate().map(|(row, sum)| sum[state(row)]);
+            let lit = lit.sum::<f64>();
+            match &sums.tiles {
+                None => lit as f32,
+                Some(tiles) => {
+                    let mut lost = 0.0;
+                    for (row, sums) in tiles.iter().enumerate() {
+                        for (tile, sum) in sums.iter().enumerate() {
+                            lost += sum[state(row)] * lit_share(rows, cols, row / TILE, tile);
+                        }
+                    }
+                    (lit - tile_sag * lost) as f32
+                }
+            }
+        })
+    }
+}
+
+/// Share of the LEDs of a tile that are lit.
+fn lit_share(rows: u32, cols: u32, tile_row: usize, tile_column: usize) -> f64 {
+    let ones = |lines: u32, tile: usize| f64::from((lines >> (TILE * tile) & 0xff).count_ones());
+    let (rows, cols, side) = (ones(rows, tile_row), ones(cols, tile_column), TILE as f64);
+    (rows * cols + (side - rows) * (side - cols)) / (side * side)
+}
+
 /// Light of each row if its line is 0, which lights the columns at 0, and if its line is 1.
-fn row_sums(electrons: &[f32], cols: u32) -> [[f64; 2]; SIDE] {
-    let mut sums = [[0.0; 2]; SIDE];
-    for (sum, leds) in sums.iter_mut().zip(electrons.chunks_exact(SIDE)) {
+fn row_sums(electrons: &[f32], cols: u32, tile_sag: f64) -> RowSums {
+    let mut whole = [[0.0; 2]; SIDE];
+    let mut tiles = (tile_sag != 0.0).then(|| Box::new([[[0.0; 2]; TILES]; SIDE]));
+    for (row, leds) in electrons.chunks_exact(SIDE).enumerate() {
         for (column, &led) in leds.iter().enumerate() {
-            sum[(cols >> column & 1) as usize] += f64::from(led);
+            let state = (cols >> column & 1) as usize;
+            whole[row][state] += f64::from(led);
+            if let Some(tiles) = &mut tiles {
+                tiles[row][column / TILE][state] += f64::from(led);
+            }
         }
     }
-    sums
+    RowSums { whole, tiles }
 }

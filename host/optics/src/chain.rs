@@ -9,9 +9,10 @@
 //!
 //! # Stages
 //!
-//! The LEDs follow their lines with a first-order edge. Daylight is added. The amplifier's pole
-//! smooths both. Shot noise (variance = electrons collected in the sample) and amplifier noise are
-//! added. The ADC divides by its gain, adds its baseline and its own noise, rounds and clips. The
+//! The LEDs follow their lines with a first-order edge, or with a rise and a fall that differ
+//! ([`crate::edges`]). Daylight is added. The amplifier's pole smooths both, and the charge that the
+//! LED lines inject into it. Shot noise (variance = electrons collected in the sample) and amplifier
+//! noise are added. The ADC divides by its gain, adds its baseline and its own noise, rounds and clips. The
 //! ADC's pipeline delays the result. Light is constant within a clock, and a sample is the signal
 //! at the clock's end, so the two poles are stepped exactly, without approximation.
 //!
@@ -33,6 +34,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::Budget;
+use crate::edges::{LedEdges, Light, Pools, time_constant_ns};
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
 
 /// The steps of the switchable amplifier gain, in electrons per ADC count: two steps per octave.
@@ -81,13 +83,24 @@ pub enum ChainError {
     },
 }
 
+/// Settings that came later are part of a camera's serial number only where they are used, so that
+/// kept calibrations stay those of their camera.
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 /// The receiver's settings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ChainSettings {
     /// ADC clock period, in ns: [`crate::instrument::SAMPLE_NS`].
     pub sample_ns: f64,
-    /// LED rise and fall time from 10 to 90 %, in ns. Fast 1550 nm LEDs take 10 to 20.
-    pub led_edge_ns: f64,
+    /// How the LEDs follow their lines.
+    #[serde(flatten)]
+    pub led: LedEdges,
+    /// Charge that a rising row or column line injects into the amplifier's input, in electrons; a
+    /// falling line takes as much.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub line_electrons: f64,
     /// Amplifier bandwidth at -3 dB, in Hz; infinite means no pole.
     pub amplifier_bandwidth_hz: f64,
     /// Daylight, in electrons per sample ([`Budget::ambient_electrons`]).
@@ -131,7 +144,8 @@ impl ChainSettings {
     #[must_use]
     pub fn ideal() -> Self {
         Self {
-            led_edge_ns: 0.0,
+            led: LedEdges::alike(0.0),
+            line_electrons: 0.0,
             amplifier_bandwidth_hz: f64::INFINITY,
             ambient_electrons: 0.0,
             electrons_per_count: 1.0,
@@ -231,7 +245,8 @@ impl ChainSettings {
     }
 
     /// The pattern's own share of the light in its samples, if `blanked` of its `clocks` are
-    /// excluded; 1 if LEDs and amplifier have settled.
+    /// excluded; 1 if LEDs and amplifier have settled. The mean of rising and falling light, which is
+    /// what a differential pair keeps of its pattern.
     #[must_use]
     pub fn own_share(&self, clocks: u32, blanked: u32) -> f64 {
         let window = blanked.min(clocks.saturating_sub(1))..clocks.max(1);
@@ -241,11 +256,40 @@ impl ChainSettings {
 
     /// Part of a step of light that sample `n` after the step shows. Sample 0 is the clock in which
     /// the lines changed. The analytic response of the two poles, without the ADC's latency.
+    ///
+    /// If rise and fall differ, this is their mean: the part of the response that is linear in the
+    /// patterns. [`Self::rising`] and [`Self::falling`] are the two steps.
     #[must_use]
     pub fn settling(&self, n: u32) -> f64 {
-        let t = (f64::from(n) + 1.0) * self.sample_ns;
-        let (led, amplifier) = (self.led_tau_ns(), self.amplifier_tau_ns());
+        if self.led.are_alike() {
+            return self.rising(n);
+        }
+        (self.rising(n) + self.falling(n)) / 2.0
+    }
+
+    /// Part of a step from dark to lit that sample `n` after the step shows.
+    #[must_use]
+    pub fn rising(&self, n: u32) -> f64 {
+        self.step(n, self.led.rise_ns, self.led.turn_on_delay_ns)
+    }
+
+    /// Part of a step from lit to dark that sample `n` after the step shows: 1 if no light is left.
+    #[must_use]
+    pub fn falling(&self, n: u32) -> f64 {
+        self.step(n, self.led.fall_ns, self.led.turn_off_delay_ns)
+    }
+
+    fn step(&self, n: u32, edge_ns: f64, delay_ns: f64) -> f64 {
+        let t = (f64::from(n) + 1.0) * self.sample_ns - delay_ns;
+        let (led, amplifier) = (time_constant_ns(edge_ns), self.amplifier_tau_ns());
         1.0 - decay(t, amplifier) - shared_decay(t, led, amplifier)
+    }
+
+    /// Whether the samples are linear in the patterns: rising and falling light are alike, and lines
+    /// inject no charge.
+    #[must_use]
+    pub fn is_linear(&self) -> bool {
+        self.led.are_alike() && self.line_electrons == 0.0
     }
 
     /// Checks the settings.
@@ -265,7 +309,6 @@ impl ChainSettings {
         let gain = self.electrons_per_count;
         ensure(gain.is_finite() && gain > 0.0, "electrons_per_count", gain, more)?;
         let not_negative = [
-            ("led_edge_ns", self.led_edge_ns),
             ("ambient_electrons", self.ambient_electrons),
             ("dark_electrons", self.dark_electrons),
             ("amplifier_noise_electrons", self.amplifier_noise_electrons),
@@ -274,15 +317,13 @@ impl ChainSettings {
         for (name, value) in not_negative {
             ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
         }
+        self.led.validate(self.sample_ns)?;
+        let line = self.line_electrons;
+        ensure(line.is_finite(), "line_electrons", line, "a finite number")?;
         let offset = self.adc_offset_counts;
         ensure(offset <= FULL_SCALE_COUNTS, "adc_offset_counts", offset.into(), "0 to 16383")?;
         let latency = self.adc_latency_clocks;
         ensure(latency <= MAX_ADC_LATENCY_CLOCKS, "adc_latency_clocks", latency.into(), "0 to 63")
-    }
-
-    /// Time constant of the LEDs: a first-order edge takes ln 9 of them from 10 to 90 %.
-    fn led_tau_ns(&self) -> f64 {
-        self.led_edge_ns / 9.0_f64.ln()
     }
 
     fn amplifier_tau_ns(&self) -> f64 {
@@ -290,7 +331,7 @@ impl ChainSettings {
     }
 }
 
-fn ensure(
+pub(crate) fn ensure(
     holds: bool,
     name: &'static str,
     value: f64,
@@ -300,13 +341,13 @@ fn ensure(
 }
 
 /// exp(-t / tau). A pole with a time constant of 0 keeps nothing.
-fn decay(t: f64, tau: f64) -> f64 {
+pub(crate) fn decay(t: f64, tau: f64) -> f64 {
     if tau > 0.0 { (-t / tau).exp() } else { 0.0 }
 }
 
 /// The rest in a pole `second` at time `t`, of a unit that was in the preceding pole `first` at
 /// time 0: `first / (first - second) * (exp(-t / first) - exp(-t / second))`.
-fn shared_decay(t: f64, first: f64, second: f64) -> f64 {
+pub(crate) fn shared_decay(t: f64, first: f64, second: f64) -> f64 {
     let difference = first - second;
     if first == 0.0 {
         0.0
@@ -315,6 +356,12 @@ fn shared_decay(t: f64, first: f64, second: f64) -> f64 {
     } else {
         first / difference * (decay(t, first) - decay(t, second))
     }
+}
+
+/// Light that counts: a number of 0 or more.
+#[inline]
+fn electrons(light: f32) -> f64 {
+    if light > 0.0 { f64::from(light.min(f32::MAX)) } else { 0.0 }
 }
 
 /// One word from the ADC.
@@ -351,6 +398,11 @@ pub struct Chain {
     rng: Pcg64Mcg,
     pipeline: [AdcSample; MAX_ADC_LATENCY_CLOCKS as usize],
     pipeline_at: usize,
+    /// The LEDs' light, where one pole of its sum does not describe it.
+    pools: Pools,
+    has_pools: bool,
+    /// Charge that one rising line leaves in the amplifier's output at the end of the clock, in electrons per sample.
+    line_amplified: f64,
 }
 
 impl Chain {
@@ -361,8 +413,13 @@ impl Chain {
     /// [`ChainError::Setting`] naming the setting that is out of range.
     pub fn new(settings: ChainSettings, seed: u64) -> Result<Self, ChainError> {
         settings.validate()?;
-        let (t, led, amplifier) =
-            (settings.sample_ns, settings.led_tau_ns(), settings.amplifier_tau_ns());
+        let (t, led, amplifier) = (
+            settings.sample_ns,
+            time_constant_ns(settings.led.rise_ns),
+            settings.amplifier_tau_ns(),
+        );
+        // Without a pole, charge has passed within the clock.
+        let per_charge = if amplifier > 0.0 { t / amplifier * decay(t, amplifier) } else { 0.0 };
         let mut chain = Self {
             settings,
             led_decay: decay(t, led),
@@ -381,6 +438,9 @@ impl Chain {
             rng: Pcg64Mcg::seed_from_u64(seed),
             pipeline: [AdcSample { counts: 0, over_range: false }; _],
             pipeline_at: 0,
+            pools: Pools::of(&settings.led, t, amplifier),
+            has_pools: !settings.is_linear() || settings.led.has_delay(),
+            line_amplified: settings.line_electrons * per_charge,
         };
         let dark = chain.convert(settings.ambient_electrons + settings.dark_electrons);
         chain.pipeline.fill(dark);
@@ -393,18 +453,75 @@ impl Chain {
         &self.settings
     }
 
-    /// One ADC clock. `light_electrons` is the light per sample after the LEDs have settled
-    /// ([`crate::LedArray::light`]). Light below 0, or NaN, counts as 0.
+    /// Whether the samples depend on more than the sum of the light, so that [`Self::sample`] wants the
+    /// light of [`crate::LedArray::step`].
+    #[must_use]
+    pub fn sees_switching(&self) -> bool {
+        self.has_pools
+    }
+
+    /// One ADC clock with the light of [`crate::LedArray::step`], or with the light per sample after
+    /// the LEDs have settled ([`crate::LedArray::light`]). Light below 0, or NaN, counts as 0.
     #[inline]
-    pub fn sample(&mut self, light_electrons: f32) -> AdcSample {
-        let light =
-            if light_electrons > 0.0 { f64::from(light_electrons.min(f32::MAX)) } else { 0.0 };
+    pub fn sample(&mut self, light: impl Into<Light>) -> AdcSample {
+        let light = light.into();
+        if self.has_pools {
+            self.switch(light);
+        } else {
+            self.follow(electrons(light.settled));
+        }
+        self.digitise()
+    }
+
+    /// One ADC clock of a receiver that [sees switching](Self::sees_switching), with the light of the
+    /// clock before unless a new one is given: as [`Self::sample`], and faster.
+    #[inline]
+    pub fn sample_switching(&mut self, new: Option<Light>) -> AdcSample {
+        match new {
+            Some(light) => self.switch(light),
+            None => {
+                let settled = self.pools.settled();
+                let off_by = self.amplified_electrons - settled;
+                self.amplified_electrons =
+                    settled + off_by * self.amplifier_decay + self.pools.hold();
+            }
+        }
+        self.digitise()
+    }
+
+    /// One ADC clock with the settled light per sample ([`crate::LedArray::light`]), of a receiver that
+    /// does not [see switching](Self::sees_switching): as [`Self::sample`], and faster.
+    #[inline]
+    pub fn sample_sum(&mut self, settled: f32) -> AdcSample {
+        self.follow(electrons(settled));
+        self.digitise()
+    }
+
+    /// LEDs and lines that switch one by one, and the amplifier.
+    #[inline]
+    fn switch(&mut self, light: Light) {
+        let settled = electrons(light.settled);
+        let off_by = self.amplified_electrons - settled;
+        self.amplified_electrons = settled
+            + off_by * self.amplifier_decay
+            + self.pools.switch(settled, electrons(light.switched))
+            // The charge has no shot noise. The noise that it gets here is over before a pattern's samples count.
+            + f64::from(light.lines_risen) * self.line_amplified;
+    }
+
+    /// LEDs whose light is described by its sum, and the amplifier.
+    #[inline]
+    fn follow(&mut self, light: f64) {
         let led_off_by = self.led_electrons - light;
         let amplifier_off_by = self.amplified_electrons - light;
         self.amplified_electrons =
             light + amplifier_off_by * self.amplifier_decay + led_off_by * self.led_into_amplifier;
         self.led_electrons = light + led_off_by * self.led_decay;
+    }
 
+    /// Noise and ADC.
+    #[inline]
+    fn digitise(&mut self) -> AdcSample {
         let steady = self.settings.ambient_electrons + self.settings.dark_electrons;
         let electrons = self.amplified_electrons + steady;
         let shot = if self.settings.shot_noise { electrons.max(0.0) } else { 0.0 };

@@ -10,6 +10,7 @@
 //! | [`relief`] | a picture and the distance of each pixel | the light of each LED, with the defocus of each distance |
 //! | [`budget`] | watts, apertures, distance | electrons per ADC sample for one LED, and for daylight |
 //! | [`mod@array`] | 32 row and 32 column lines | electrons per ADC sample for the LEDs they light |
+//! | [`edges`] | lines that change | the light on its way: LEDs that rise and LEDs that fall |
 //! | [`chain`] | electrons, one clock at a time | 14-bit ADC samples with noise, settling and latency |
 //! | [`daylight`], [`lamp`] | kilolux, wavelength, filter | W/m^2 of daylight or lamp light on the target |
 //! | [`depth`] | distance | an 8 x 8 time-of-flight reading, and its place in the image |
@@ -38,6 +39,7 @@ pub mod camera;
 pub mod chain;
 pub mod daylight;
 pub mod depth;
+pub mod edges;
 pub mod instrument;
 pub mod lamp;
 pub mod mie;
@@ -58,6 +60,7 @@ pub use budget::{Budget, BudgetError, BudgetSettings, BudgetTerms};
 pub use camera::{CameraModel, CameraModelError};
 pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
 pub use depth::{DEPTH_SIDE, DepthError, DepthGeometry, DepthView, SimulatedDepth};
+pub use edges::{LedEdges, Light};
 pub use instrument::{LEDS, SIDE, WAVELENGTH_NM};
 pub use projector::{Footprint, Projector, ProjectorError};
 pub use relief::{Relief, ReliefError};

@@ -146,7 +146,9 @@ impl PixelBudget {
         let Readout { clocks_per_pattern, blanked, .. } = instrument.readout;
         let window = u32::from(clocks_per_pattern.saturating_sub(blanked).max(1));
         let own = chain.own_share(clocks_per_pattern.into(), blanked.into());
-        let settled = own - (1.0 - own) / 2.0;
+        // Of a tile, half of the LEDs are lit in nearly every pattern and in its complement.
+        let sagged = 1.0 - instrument.tile_sag / 2.0;
+        let settled = (own - (1.0 - own) / 2.0) * sagged;
         let clocks = exposure_us * 1e3 / instrument.budget.sample_ns;
         let samples = clocks * f64::from(window) / f64::from(clocks_per_pattern);
         // Windows are so far apart that their noise is independent.

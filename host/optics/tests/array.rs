@@ -4,6 +4,7 @@
 
 use nirspi_optics::{Footprint, LEDS, LedArray, Projector, SIDE, Scene};
 use proptest::prelude::*;
+use std::sync::LazyLock;
 
 /// A footprint in which every LED sees something of its own.
 fn footprint() -> Footprint {
@@ -72,6 +73,62 @@ fn states_that_differ_in_one_line_are_remembered_apart() {
     for (rows, cols) in (0..64).map(lines) {
         let fresh = LedArray::new(&footprint, 26.0).light(rows, cols, true);
         assert_eq!(remembering.light(rows, cols, true), fresh, "{rows:#x} {cols:#x}");
+    }
+}
+
+static SEEN: LazyLock<Footprint> = LazyLock::new(footprint);
+
+/// Light of the LEDs for which this holds, one by one.
+fn one_by_one(electrons: f64, lit: impl Fn(usize, usize) -> f64) -> f64 {
+    let light = |(i, &w): (usize, &f32)| f64::from(w) * electrons * lit(i / SIDE, i % SIDE);
+    SEEN.weights().iter().enumerate().map(light).sum()
+}
+
+fn is_lit((rows, cols, enabled): (u32, u32, bool), row: usize, column: usize) -> bool {
+    enabled && rows >> row & 1 == cols >> column & 1
+}
+
+proptest! {
+    #[test]
+    fn the_light_of_switched_leds_is_that_of_leds_that_differ(
+        states in prop::collection::vec(any::<(u32, u32, bool)>(), 1..30)
+    ) {
+        let mut leds = LedArray::new(&SEEN, 26.0);
+        let mut before = (0, 0, false);
+        for now in states {
+            let light = leds.step(now.0, now.1, now.2);
+            let differs = |row, column| {
+                f64::from(u8::from(is_lit(now, row, column) != is_lit(before, row, column)))
+            };
+            let expected = one_by_one(26.0, differs);
+            prop_assert!((f64::from(light.switched) - expected).abs() < 0.01, "{} {}", light.switched, expected);
+            prop_assert_eq!(light.settled, leds.light(now.0, now.1, now.2));
+            let high = |(rows, cols, _): (u32, u32, bool)| (rows.count_ones() + cols.count_ones()) as i8;
+            prop_assert_eq!(light.lines_risen, high(now) - high(before));
+            // A second clock with the same lines switches nothing.
+            let again = leds.step(now.0, now.1, now.2);
+            prop_assert_eq!((again.switched, again.lines_risen, again.settled), (0.0, 0, light.settled));
+            before = now;
+        }
+    }
+
+    #[test]
+    fn a_tile_loses_light_by_its_own_lit_leds(rows: u32, cols: u32, sag in 0.0..0.5) {
+        let mut leds = LedArray::new(&SEEN, 26.0).with_tile_sag(sag);
+        let now = (rows, cols, true);
+        let mut lit_of_tile = [[0.0; 4]; 4];
+        for (row, column) in (0..LEDS).map(|i| (i / SIDE, i % SIDE)) {
+            lit_of_tile[row / 8][column / 8] += f64::from(u8::from(is_lit(now, row, column)));
+        }
+        let expected = one_by_one(26.0, |row, column| {
+            f64::from(u8::from(is_lit(now, row, column))) * (1.0 - sag * lit_of_tile[row / 8][column / 8] / 64.0)
+        });
+        let found = f64::from(leds.light(rows, cols, true));
+        prop_assert!((found - expected).abs() < 0.01, "{found} {expected}");
+        // Switched light is of LEDs that lose nothing.
+        let switched = f64::from(leds.step(rows, cols, true).switched);
+        let lit = one_by_one(26.0, |row, column| f64::from(u8::from(is_lit(now, row, column))));
+        prop_assert!((switched - lit).abs() < 0.01, "{switched} {lit}");
     }
 }
 

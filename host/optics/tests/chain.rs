@@ -5,7 +5,7 @@
 use nirspi_optics::chain::{GAINS_ELECTRONS_PER_COUNT, amplifier_noise_electrons};
 use nirspi_optics::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
 use nirspi_optics::{
-    AdcSample, Budget, BudgetSettings, Chain, ChainError, ChainSettings, Projector,
+    AdcSample, Budget, BudgetSettings, Chain, ChainError, ChainSettings, LedEdges, Light, Projector,
 };
 use proptest::prelude::*;
 
@@ -198,8 +198,9 @@ fn amplifier_noise_follows_from_its_current_density() {
 #[test]
 fn leds_settle_as_fast_as_their_data_sheet_says() {
     // FACTS.md: a 10 ns LED leaves 3 % after 16 ns, a 20 ns one 7 % after 24 ns.
-    for (led_edge_ns, clocks, left) in [(10.0, 2, 0.030), (20.0, 3, 0.072)] {
-        let settings = ChainSettings { led_edge_ns, ..ChainSettings::ideal() };
+    for (edge_ns, clocks, left) in [(10.0, 2, 0.030), (20.0, 3, 0.072)] {
+        let led = LedEdges::alike(edge_ns);
+        let settings = ChainSettings { led, ..ChainSettings::ideal() };
         assert!((1.0 - settings.settling(clocks - 1) - left).abs() < 0.001);
     }
 }
@@ -265,12 +266,62 @@ fn gains_rise_by_half_octaves() {
     }
 }
 
+/// A row line with 1 fF and 3.3 V injects 20 597 electrons, of which one pole of 60 MHz leaves `T / tau exp(-t / tau)`.
+#[test]
+fn a_line_that_rises_injects_its_charge_and_one_that_falls_takes_it_back() {
+    let line_electrons = 20_597.0;
+    let settings = ChainSettings {
+        line_electrons,
+        amplifier_bandwidth_hz: 60e6,
+        adc_offset_counts: 5000,
+        ..ChainSettings::ideal()
+    };
+    let tau_ns = 1e9 / (std::f64::consts::TAU * 60e6);
+    let mut chain = chain(settings, 0);
+    let lines = |lines_risen| Light { lines_risen, ..Light::default() };
+    for (risen, charge) in [(1, 1.0), (-1, -1.0), (0, 0.0)] {
+        for clock in 0..5 {
+            let light = if clock == 0 { lines(risen) } else { lines(0) };
+            let found = f64::from(chain.sample(light).counts) - 5000.0;
+            let t = 8.0 * f64::from(clock + 1);
+            let expected = charge * line_electrons * 8.0 / tau_ns * (-t / tau_ns).exp();
+            // What the lines before have left, 40 ns later, is below a count.
+            assert!((found - expected).abs() <= 0.6, "{risen}, clock {clock}: {found}, {expected}");
+        }
+    }
+    // Without a pole the charge has passed before the sample.
+    let ideal = ChainSettings { line_electrons, ..ChainSettings::ideal() };
+    let mut chain = Chain::new(ideal, 0).unwrap();
+    assert_eq!(chain.sample(lines(32)).counts, ideal.adc_offset_counts);
+}
+
+#[test]
+fn settling_is_the_mean_of_rise_and_fall() {
+    let led =
+        LedEdges { rise_ns: 12.0, fall_ns: 17.0, turn_on_delay_ns: 1.0, turn_off_delay_ns: 0.0 };
+    let two = ChainSettings { led, ..ChainSettings::default() };
+    for n in 0..10 {
+        let mean = (two.rising(n) + two.falling(n)) / 2.0;
+        assert!((two.settling(n) - mean).abs() < 1e-15 && two.rising(n) != two.falling(n));
+    }
+    let alike = |edge_ns| ChainSettings { led: LedEdges::alike(edge_ns), ..two };
+    assert_eq!(two.falling(3), alike(17.0).settling(3));
+    assert!(two.own_share(5, 2) < alike(12.0).own_share(5, 2));
+    assert!(two.own_share(5, 2) > alike(17.0).own_share(5, 2));
+    assert!(!two.is_linear() && alike(12.0).is_linear());
+}
+
 #[test]
 fn settings_out_of_range_are_named() {
     let default = ChainSettings::default();
+    let led = |led| ChainSettings { led, ..default };
     let cases = [
         ("sample_ns", ChainSettings { sample_ns: 0.0, ..default }),
-        ("led_edge_ns", ChainSettings { led_edge_ns: -1.0, ..default }),
+        ("rise_ns", led(LedEdges { rise_ns: -1.0, ..default.led })),
+        ("fall_ns", led(LedEdges { fall_ns: f64::NAN, ..default.led })),
+        ("turn_on_delay_ns", led(LedEdges { turn_on_delay_ns: 8.1, ..default.led })),
+        ("turn_off_delay_ns", led(LedEdges { turn_off_delay_ns: -0.1, ..default.led })),
+        ("line_electrons", ChainSettings { line_electrons: f64::NAN, ..default }),
         ("amplifier_bandwidth_hz", ChainSettings { amplifier_bandwidth_hz: f64::NAN, ..default }),
         ("ambient_electrons", ChainSettings { ambient_electrons: f64::INFINITY, ..default }),
         ("dark_electrons", ChainSettings { dark_electrons: -1.0, ..default }),
@@ -291,12 +342,12 @@ fn settings_out_of_range_are_named() {
 proptest! {
     #[test]
     fn a_step_settles_as_the_analytic_response_says(
-        led_edge_ns in prop_oneof![Just(0.0), 0.5..40.0],
+        edge_ns in prop_oneof![Just(0.0), 0.5..40.0],
         bandwidth_mhz in prop_oneof![Just(f64::INFINITY), 5.0..500.0],
         light in 1_000.0_f32..14_000.0,
     ) {
         let settings = ChainSettings {
-            led_edge_ns,
+            led: LedEdges::alike(edge_ns),
             amplifier_bandwidth_hz: bandwidth_mhz * 1e6,
             ..ChainSettings::ideal()
         };
@@ -321,7 +372,7 @@ proptest! {
         let bandwidth_of = |tau_ns: f64| 1e9 / (std::f64::consts::TAU * tau_ns);
         let tau_ns = edge_ns / 9.0_f64.ln();
         let with = |tau_ns| ChainSettings {
-            led_edge_ns: edge_ns,
+            led: LedEdges::alike(edge_ns),
             amplifier_bandwidth_hz: bandwidth_of(tau_ns),
             ..ChainSettings::ideal()
         };

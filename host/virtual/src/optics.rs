@@ -185,7 +185,7 @@ impl VirtualOptics {
             // settling.
             let chain =
                 ChainSettings { electrons_per_count: 1.0, ambient_electrons: 0.0, ..*chain };
-            canonical(&camera) + &canonical(&chain)
+            camera.key_text() + &canonical(&chain)
         };
         let this = instrument(&self.camera, &self.chain);
         if this == instrument(CameraModel::paper(), &ChainSettings::default()) {
@@ -336,17 +336,22 @@ impl VirtualOptics {
         &self.chain
     }
 
+    /// The LEDs in front of the scene.
+    #[must_use]
+    pub fn led_array(&self) -> LedArray {
+        LedArray::new(&self.footprint, self.budget.electrons_per_led)
+            .with_gains(&self.camera.led_gains())
+            .with_tile_sag(self.camera.leds.tile_sag)
+    }
+
     /// The FPGA model with gateware and ADC behind the optics.
     ///
     /// # Errors
     /// [`VirtualOpticsError`] for a receiver setting out of range.
     pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, VirtualOpticsError> {
-        let electrons_per_led = self.budget.electrons_per_led;
-        let gains = self.camera.led_gains();
-        let array = LedArray::new(&self.footprint, electrons_per_led).with_gains(&gains);
-        let fpga = OpticalFpga::new(array, Chain::new(self.chain, seed)?);
+        let fpga = OpticalFpga::new(self.led_array(), Chain::new(self.chain, seed)?);
         Ok(match self.spots(seed)? {
-            Some(spots) => fpga.in_rain(spots, electrons_per_led),
+            Some(spots) => fpga.in_rain(spots, self.budget.electrons_per_led),
             None => fpga,
         })
     }
@@ -397,6 +402,9 @@ mod tests {
         for toml in [
             "[adc]\nlatency_clocks = 9",
             "[leds]\npower_spread = 0.1",
+            "[leds]\nfall_ns = 16",
+            "[leds]\ntile_sag = 0.01",
+            "[leds]\nline_crosstalk_ff = 1",
             "[detector]\ndiameter_mm = 0.3",
             "basis = \"one-metre\"",
         ] {

@@ -42,7 +42,7 @@ impl Front {
     fn sample(&mut self, lines: Lines) -> AdcSample {
         match self {
             Self::Camera(array, chain) => {
-                let light = array.light(lines.rows, lines.columns, lines.enable);
+                let light = array.step(lines.rows, lines.columns, lines.enable);
                 let sample = chain.sample(light);
                 AdcSample { code: sample.counts, over_range: sample.over_range }
             }

@@ -5,7 +5,7 @@
 
 use crate::board::{Board, Front, HOST_PS, Seen};
 use nirspi_mcu::{BusError, FpgaBus};
-use nirspi_optics::{Chain, LedArray};
+use nirspi_optics::Chain;
 use nirspi_virtual::{SimulatedFpga, VirtualOptics};
 use nirspi_wire::register::{Register, control};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -39,7 +39,7 @@ pub struct RtlFpga {
 impl RtlFpga {
     /// A board in front of a scene, powered, with the interlock closed.
     pub fn new(optics: &VirtualOptics, seed: u64) -> Self {
-        let array = LedArray::new(optics.footprint(), optics.budget().electrons_per_led);
+        let array = optics.led_array();
         let chain = Chain::new(*optics.chain(), seed).unwrap();
         Self::behind(Front::Camera(Box::new(array), Box::new(chain)))
     }

@@ -91,6 +91,12 @@ pub enum TrainingCameraError {
     /// The scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// Light that is not linear in the patterns.
+    #[error(
+        "camera {0}: networks are trained with a camera that is linear in its patterns, expected leds.rise_ns equal \
+         to leds.fall_ns, equal turn-on and turn-off delays, and 0 for leds.tile_sag and leds.line_crosstalk_ff"
+    )]
+    NotLinear(String),
     /// Rain.
     #[error(transparent)]
     Rain(#[from] RainError),
@@ -139,6 +145,9 @@ impl LinearCamera {
         let distance_mm = projector.focus_distance_mm;
         let sheet = Scene::new(vec![1.0], 1, projector.field_mm(distance_mm))?;
         let optics = VirtualOptics::of(camera, sheet, distance_mm)?;
+        if !optics.chain().is_linear() || camera.leds.tile_sag != 0.0 {
+            return Err(TrainingCameraError::NotLinear(camera.name.clone()));
+        }
         let (clocks, blanked) = timing(camera);
         let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(seed)?)))?;
         let believed = calibrate(&mut session, &mut IgnorePackets)?.leak(clocks, blanked)?;

@@ -5,7 +5,8 @@
 
 use super::{CameraModel, SHIPPED};
 use crate::SIDE;
-use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
+use crate::edges::time_constant_ns;
+use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS, SAMPLE_NS};
 use crate::lamp::LightSource;
 use crate::rain::{Air, AirError};
 use std::str::FromStr;
@@ -15,13 +16,34 @@ use toml::{Table, Value};
 /// The key that names the shipped camera on which a file is based.
 const BASIS: &str = "basis";
 
+/// A key for rise and fall of the LEDs together, if they are alike.
+const EDGE: &str = "edge_ns";
+
+/// Keys of `[leds]` that came after the first networks were trained, and the value with which they do nothing.
+const NEW_LED_KEYS: [(&str, f64); 4] = [
+    ("turn_on_delay_ns", 0.0),
+    ("turn_off_delay_ns", 0.0),
+    ("tile_sag", 0.0),
+    ("line_crosstalk_ff", 0.0),
+];
+
+/// Time constants of the slower edge that a pattern must last if rise and fall differ
+/// ([`crate::edges`], accuracy).
+const SETTLED_CONSTANTS: f64 = 4.0;
+
 /// The range of each number: key, minimum, maximum. Units are in the keys.
 pub(super) const RANGES: &[(&str, f64, f64)] = &[
     ("wavelength_nm", 400.0, 1700.0),
     ("leds.power_mw", 0.001, 1000.0),
     ("leds.spectrum_fwhm_nm", 0.1, 1000.0),
     ("leds.half_angle_deg", 0.1, 60.0),
-    ("leds.edge_ns", 0.0, 10_000.0),
+    ("leds.rise_ns", 0.0, 10_000.0),
+    ("leds.fall_ns", 0.0, 10_000.0),
+    ("leds.turn_on_delay_ns", 0.0, SAMPLE_NS),
+    ("leds.turn_off_delay_ns", 0.0, SAMPLE_NS),
+    ("leds.tile_sag", 0.0, 0.5),
+    ("leds.line_crosstalk_ff", 0.0, 100_000.0),
+    ("leds.line_swing_v", 0.1, 100.0),
     ("leds.power_spread", 0.0, 0.5),
     ("leds.pointing_spread_deg", 0.0, 45.0),
     ("leds.spread_seed", 0.0, 4_294_967_295.0),
@@ -109,6 +131,9 @@ pub fn read(text: &str) -> Result<CameraModel, CameraModelError> {
         Some(text) if basis.as_deref() != Some(SHIPPED[0].0) => table_of(&read(text)?),
         _ => parse(SHIPPED[0].1)?,
     };
+    if let Some(Value::Table(leds)) = given.get_mut("leds") {
+        both_edges(leds)?;
+    }
     put(&mut table, given, "")?;
     check_table(&table)?;
     let model: CameraModel = Value::Table(table).try_into().map_err(|error: toml::de::Error| {
@@ -134,9 +159,47 @@ pub fn check(model: &CameraModel) -> Result<(), CameraModelError> {
     check_together(model)
 }
 
-fn table_of(model: &CameraModel) -> Table {
+pub(super) fn table_of(model: &CameraModel) -> Table {
     // The type holds only numbers, words and lists of numbers, so the conversion does not fail.
     Table::try_from(model).unwrap_or_default()
+}
+
+/// Replaces [`EDGE`] by rise and fall.
+fn both_edges(leds: &mut Table) -> Result<(), CameraModelError> {
+    let Some(edge) = leds.remove(EDGE) else { return Ok(()) };
+    let key = format!("leds.{EDGE}");
+    if leds.contains_key("rise_ns") || leds.contains_key("fall_ns") {
+        let expected = "either edge_ns or rise_ns and fall_ns, because edge_ns is both";
+        return Err(value(&key, &edge, expected));
+    }
+    let edge = match edge {
+        Value::Integer(whole) => Value::Float(whole as f64),
+        edge => edge,
+    };
+    let fits = |range: (f64, f64), found: f64| (range.0..=range.1).contains(&found);
+    match (range("leds.rise_ns"), edge.as_float()) {
+        (Some(range), Some(found)) if fits(range, found) => {}
+        _ => return Err(value(&key, &edge, kind("leds.rise_ns", &Value::Float(0.0)))),
+    }
+    leds.insert("rise_ns".to_owned(), edge.clone());
+    leds.insert("fall_ns".to_owned(), edge);
+    Ok(())
+}
+
+/// Makes the section `[leds]` as it was before rise and fall could differ, where it says nothing else.
+pub(super) fn fold_new_keys(leds: &mut Table) {
+    if leds.get("rise_ns") == leds.get("fall_ns") && leds.remove("fall_ns").is_some() {
+        let edge = leds.remove("rise_ns");
+        leds.extend(edge.map(|edge| (EDGE.to_owned(), edge)));
+    }
+    for (key, unused) in NEW_LED_KEYS {
+        if leds.get(key).and_then(Value::as_float) == Some(unused) {
+            leds.remove(key);
+        }
+    }
+    if !leds.contains_key("line_crosstalk_ff") {
+        leds.remove("line_swing_v");
+    }
 }
 
 fn parse(text: &str) -> Result<Table, CameraModelError> {
@@ -253,6 +316,21 @@ fn check_together(model: &CameraModel) -> Result<(), CameraModelError> {
     let (blanked, clocks) = (model.readout.blanked, model.readout.clocks_per_pattern);
     let fewer = format!("less than the {clocks} of readout.clocks_per_pattern");
     expect(blanked < clocks, "readout.blanked", blanked.into(), fewer)?;
+    let leds = &model.leds;
+    if leds.rise_ns != leds.fall_ns || leds.turn_on_delay_ns != leds.turn_off_delay_ns {
+        let slot_ns = f64::from(clocks) * SAMPLE_NS;
+        let most = slot_ns / SETTLED_CONSTANTS * 9.0_f64.ln();
+        let (key, slower) = if leds.rise_ns > leds.fall_ns {
+            ("leds.rise_ns", leds.rise_ns)
+        } else {
+            ("leds.fall_ns", leds.fall_ns)
+        };
+        let expected = format!(
+            "at most {most:.1} for patterns of {slot_ns} ns, because rise and fall differ and LEDs \
+             must settle within a pattern"
+        );
+        expect(time_constant_ns(slower) * SETTLED_CONSTANTS <= slot_ns, key, slower, expected)?;
+    }
     let efficiency = model.quantum_efficiency();
     let most = model.detector.responsivity_a_per_w / efficiency;
     let at = model.wavelength_nm;

@@ -70,8 +70,21 @@ pub struct Leds {
     pub spectrum_fwhm_nm: f64,
     /// Angle off the LED's axis at which its radiant intensity has halved.
     pub half_angle_deg: f64,
-    /// Rise and fall time from 10 to 90 %.
-    pub edge_ns: f64,
+    /// Rise time of the light from 10 to 90 %. A file may say `edge_ns` for rise and fall together.
+    pub rise_ns: f64,
+    /// Fall time of the light from 90 to 10 %.
+    pub fall_ns: f64,
+    /// Time from a line's change until the light begins to rise: at most one ADC clock.
+    pub turn_on_delay_ns: f64,
+    /// Time from a line's change until the light begins to fall: at most one ADC clock.
+    pub turn_off_delay_ns: f64,
+    /// Share of its light that a tile of 8 x 8 LEDs loses by the sag of its supply if all 64 are lit.
+    pub tile_sag: f64,
+    /// Capacitance from each row and column line to the amplifier's input. A changing line injects
+    /// capacitance times swing.
+    pub line_crosstalk_ff: f64,
+    /// Voltage by which a line changes.
+    pub line_swing_v: f64,
     /// Standard deviation of the power between LEDs, as a share of the mean.
     pub power_spread: f64,
     /// Standard deviation of the pointing along each axis.
@@ -234,11 +247,22 @@ impl CameraModel {
         file::write(self)
     }
 
-    /// A short name of the whole description, from its [canonical] text: FNV-1a, 32 bit,
+    /// A short name of the whole description, from its [text](Self::key_text): FNV-1a, 32 bit,
     /// not a checksum (Fowler, Noll and Vo).
     #[must_use]
     pub fn digest(&self) -> u32 {
-        fnv1a(canonical(self).as_bytes())
+        fnv1a(self.key_text().as_bytes())
+    }
+
+    /// The [canonical] text of the whole description. Keys that came after the first networks were
+    /// trained are in it only where they are used: a description keeps its name.
+    #[must_use]
+    pub fn key_text(&self) -> String {
+        let mut table = file::table_of(self);
+        if let Some(toml::Value::Table(leds)) = table.get_mut("leds") {
+            file::fold_new_keys(leds);
+        }
+        canonical(&table)
     }
 
     /// Checks all ranges, for a description that was changed after reading.

@@ -62,7 +62,7 @@ fn what_a_file_does_not_say_is_as_in_its_basis() {
 #[test]
 fn mistakes_are_named_with_key_found_and_expected() {
     let cases = [
-        ("[leds]\npower = 4", "found leds.power, expected one of dead, edge_ns, half_angle_deg"),
+        ("[leds]\npower = 4", "found leds.power, expected one of dead, fall_ns, half_angle_deg"),
         ("[led]\npower_mw = 4", "found led, expected one of adc, amplifier"),
         ("[leds]\npower_mw = -1", "leds.power_mw is -1.0, expected a number from 0.001 to 1000"),
         (
@@ -70,6 +70,33 @@ fn mistakes_are_named_with_key_found_and_expected() {
             "leds.power_mw is \"4\", expected a number from 0.001 to 1000",
         ),
         ("[leds]\npower_mw = nan", "leds.power_mw is nan, expected a number from 0.001 to 1000"),
+        ("[leds]\nrise_ns = -1", "leds.rise_ns is -1.0, expected a number from 0 to 10000"),
+        ("[leds]\nfall_ns = nan", "leds.fall_ns is nan, expected a number from 0 to 10000"),
+        ("[leds]\nfall_ns = \"15\"", "leds.fall_ns is \"15\", expected a number from 0 to 10000"),
+        (
+            "[leds]\nfall_ns = 60",
+            "leds.fall_ns is 60, expected at most 22.0 for patterns of 40 ns, because rise and fall differ",
+        ),
+        ("[leds]\nedge_ns = -1", "leds.edge_ns is -1.0, expected a number from 0 to 10000"),
+        ("[leds]\nedge_ns = inf", "leds.edge_ns is inf, expected a number from 0 to 10000"),
+        ("[leds]\nedge_ns = \"fast\"", "leds.edge_ns is \"fast\", expected a number from 0 to"),
+        (
+            "[leds]\nedge_ns = 12\nfall_ns = 13",
+            "leds.edge_ns is 12, expected either edge_ns or rise_ns and fall_ns",
+        ),
+        (
+            "[leds]\nturn_on_delay_ns = 8.5",
+            "leds.turn_on_delay_ns is 8.5, expected a number from 0 to 8",
+        ),
+        (
+            "[leds]\nturn_off_delay_ns = -1",
+            "leds.turn_off_delay_ns is -1.0, expected a number from 0 to 8",
+        ),
+        ("[leds]\ntile_sag = nan", "leds.tile_sag is nan, expected a number from 0 to 0.5"),
+        (
+            "[leds]\nline_crosstalk_ff = -3",
+            "leds.line_crosstalk_ff is -3.0, expected a number from 0 to 100000",
+        ),
         ("leds = 4", "leds is 4, expected a section [leds]"),
         (
             "[leds]\ndead = [[0, 32]]",
@@ -201,6 +228,45 @@ fn a_key_depends_on_names_and_values_alone() {
     let part = [("volts", 0.1)].into();
     let other = canonical(&Other { clocks: 9, name: "lab", part });
     assert_eq!(other, "clocks = 9\nname = \"lab\"\npart.volts = 0.1\n");
+}
+
+#[test]
+fn one_edge_in_a_file_is_rise_and_fall() {
+    let camera = CameraModel::parse("[leds]\nedge_ns = 12").unwrap();
+    assert_eq!((camera.leds.rise_ns, camera.leds.fall_ns), (12.0, 12.0));
+    // Slow LEDs that rise and fall alike are exact, however short the pattern.
+    CameraModel::parse("[leds]\nedge_ns = 60").unwrap();
+    assert_eq!(CameraModel::parse(&camera.to_toml()).unwrap(), camera);
+    let basis = CameraModel::parse("basis = \"fga015\"\n[leds]\nedge_ns = 9.5").unwrap();
+    assert_eq!((basis.leds.rise_ns, basis.leds.fall_ns), (9.5, 9.5));
+}
+
+#[test]
+fn a_description_has_the_name_that_it_had_before_rise_and_fall_could_differ() {
+    let text = |toml: &str| CameraModel::parse(toml).unwrap().key_text();
+    let of_leds = |toml: &str| -> Vec<String> {
+        text(toml).lines().filter(|line| line.starts_with("leds.")).map(str::to_owned).collect()
+    };
+    let before = of_leds("");
+    assert_eq!(before.len(), 8, "{before:#?}");
+    assert_eq!(before[1], "leds.edge_ns = 15.0");
+    for (toml, more) in [
+        ("fall_ns = 16", "leds.fall_ns = 16.0"),
+        ("turn_on_delay_ns = 1", "leds.turn_on_delay_ns = 1.0"),
+        ("tile_sag = 0.01", "leds.tile_sag = 0.01"),
+        ("line_crosstalk_ff = 1", "leds.line_swing_v = 3.3"),
+    ] {
+        let found = of_leds(&format!("[leds]\n{toml}"));
+        assert!(found.len() > 8 && found.iter().any(|line| line == more), "{found:#?}");
+    }
+}
+
+#[test]
+fn a_line_injects_capacitance_times_swing() {
+    let camera = CameraModel::parse("[leds]\nline_crosstalk_ff = 1").unwrap();
+    // 1 fF of 3.3 V is 3.3 fC.
+    assert!((camera.chain_settings().line_electrons - 20_597.0).abs() < 1.0);
+    assert_eq!(CameraModel::default().chain_settings().line_electrons, 0.0);
 }
 
 /// The short name is part of the names of trained networks: another compiler or a renamed field must

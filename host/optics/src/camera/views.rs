@@ -1,12 +1,12 @@
 //! The settings of each stage of the light's path, from the camera description. The defaults are
 //! those of the paper's camera: the stages themselves know no camera.
 
-use super::{CameraModel, Readout};
+use super::{CameraModel, Leds, Readout};
 use crate::budget::photon_j;
 use crate::chain::{adc_noise_counts, amplifier_noise_electrons};
 use crate::depth::DepthGeometry;
 use crate::instrument::SAMPLE_NS;
-use crate::{BudgetSettings, ChainSettings, LEDS, Projector, SIDE};
+use crate::{BudgetSettings, ChainSettings, LEDS, LedEdges, Projector, SIDE};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
@@ -32,6 +32,8 @@ pub struct Instrument {
     pub readout: Readout,
     /// Distance between projector and collector, in mm.
     pub baseline_mm: f64,
+    /// Share of its light that a tile of LEDs loses if all of them are lit.
+    pub tile_sag: f64,
 }
 
 impl CameraModel {
@@ -89,6 +91,18 @@ impl CameraModel {
         TAU * amplifier.feedback_kohm * 1e3 * farad * bandwidth_hz.powi(2) * 1e-9
     }
 
+    /// How the LEDs follow their lines.
+    #[must_use]
+    pub fn led_edges(&self) -> LedEdges {
+        let Leds { rise_ns, fall_ns, turn_on_delay_ns, turn_off_delay_ns, .. } = self.leds;
+        LedEdges { rise_ns, fall_ns, turn_on_delay_ns, turn_off_delay_ns }
+    }
+
+    /// Charge that a changing line injects into the amplifier: capacitance times swing, in electrons.
+    fn line_electrons(&self) -> f64 {
+        self.leds.line_crosstalk_ff * 1e-15 * self.leds.line_swing_v / ELECTRON_C
+    }
+
     /// The receiver before its gain is set, without daylight.
     #[must_use]
     pub fn chain_settings(&self) -> ChainSettings {
@@ -96,7 +110,8 @@ impl CameraModel {
         let noise_pa = self.amplifier_noise_pa_per_sqrt_hz();
         ChainSettings {
             sample_ns: SAMPLE_NS,
-            led_edge_ns: self.leds.edge_ns,
+            led: self.led_edges(),
+            line_electrons: self.line_electrons(),
             amplifier_bandwidth_hz: bandwidth_hz,
             ambient_electrons: 0.0,
             dark_electrons: self.detector.dark_current_na * 1e-9 * SAMPLE_NS * 1e-9 / ELECTRON_C,
@@ -119,6 +134,7 @@ impl CameraModel {
             chain: self.chain_settings(),
             readout: self.readout,
             baseline_mm: self.collector.baseline_mm,
+            tile_sag: self.leds.tile_sag,
         }
     }
 

@@ -43,6 +43,17 @@ fn mean_and_deviation(a: &[f32], b: &[f32]) -> (f64, f64) {
 }
 
 #[test]
+fn a_camera_that_is_not_linear_in_its_patterns_is_refused() {
+    for key in ["fall_ns = 16", "turn_on_delay_ns = 1", "tile_sag = 0.01", "line_crosstalk_ff = 1"]
+    {
+        let camera = CameraModel::parse(&format!("[leds]\n{key}")).unwrap();
+        let refused = LinearCamera::new(&camera, 1).map(|_| ()).unwrap_err();
+        assert!(matches!(refused, TrainingCameraError::NotLinear(_)), "{key}: {refused}");
+        assert!(!refused.to_string().contains('\n'), "{refused}");
+    }
+}
+
+#[test]
 fn a_picture_by_the_short_way_differs_from_a_capture_by_noise_alone() {
     let camera = LinearCamera::new(CameraModel::paper(), 1).unwrap();
     // Grey levels in the middle of the range, so that noise is not clipped.
