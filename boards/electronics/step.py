@@ -1,6 +1,8 @@
-"""The step of light at the ADC's input (chain.cir) beside the simulator's two poles, and its picture."""
+"""The step of light at the ADC's input (chain.cir) beside the simulator's two poles, what of it an image shows, and a
+picture of both."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +10,57 @@ SAMPLE_NS = 8
 # The line's edges in chain.cir, and where the lit level is read.
 RISE_NS, FALL_NS, LIT_NS = 20.0, 180.0, 175.0
 WIDTH, HEIGHT, SPAN_NS = 640, 300, 64
+# The samples of a pattern that count (readout of the paper's camera), and its length.
+WINDOW, SLOT_NS = (2, 3, 4), 40
+# Patterns after a switch that are looked at: as long as chain.cir keeps its level.
+SLOTS = 3
+PIXELS = 1024
+
+
+def pairs_see(rest: Callable[[float], float]) -> float:
+    """What of an edge all differences of pattern and complement have in common, in shares of the step: the mean rest in a
+    pattern's samples, less that in the next pattern's, and so on. `rest` is what is missing, against ns after the edge.
+
+    An LED changes in half of the patterns and in every complement. So each light that is still on its way after an odd
+    number of slots is a quarter more in the pattern than in the complement, and after an even number a quarter less.
+    """
+    means = [sum(rest(slot * SLOT_NS + (n + 1) * SAMPLE_NS) for n in WINDOW) / len(WINDOW) for slot in range(SLOTS)]
+    return sum(mean if slot % 2 == 0 else -mean for slot, mean in enumerate(means))
+
+
+@dataclass(frozen=True)
+class Edges:
+    """The LEDs' edges as a camera description has them, before one pole of an amplifier."""
+
+    rise_ns: float
+    fall_ns: float
+    turn_on_delay_ns: float
+    turn_off_delay_ns: float
+    bandwidth_mhz: float
+
+    @staticmethod
+    def of(description: dict) -> "Edges":
+        leds = description["leds"]
+        keys = ("rise_ns", "fall_ns", "turn_on_delay_ns", "turn_off_delay_ns")
+        return Edges(*(leds[key] for key in keys), description["amplifier"]["bandwidth_mhz"])
+
+    def rising(self, ns: float) -> float:
+        return Chain.response(ns - self.turn_on_delay_ns, self.rise_ns, self.bandwidth_mhz)
+
+    def falling(self, ns: float) -> float:
+        return Chain.response(ns - self.turn_off_delay_ns, self.fall_ns, self.bandwidth_mhz)
+
+    def corner(self) -> float:
+        return corner(self.rising, self.falling)
+
+
+def corner(rising: Callable[[float], float], falling: Callable[[float], float]) -> float:
+    """What pixel (0, 0) of a white sheet is off by, in units of white, in the image of all patterns: a difference that
+    all pairs have in common is one pixel, and 1024 LEDs add to it."""
+    rise, fall = (pairs_see(lambda ns, part=part: 1 - part(ns)) for part in (rising, falling))
+    # The host undoes the leak with what calibration knows, the rise: its taps pass their sum of what all pairs share.
+    kept = 1 - 2 * sum(1 - rising((n + 1) * SAMPLE_NS) for n in WINDOW) / len(WINDOW)
+    return PIXELS * (rise - fall) / 4 / kept
 
 
 @dataclass(frozen=True)
@@ -31,13 +84,12 @@ class Chain:
 
     @staticmethod
     def response(ns: float, edge_ns: float, bandwidth_mhz: float) -> float:
-        """The simulator's step response: `ChainSettings::settling` of host/optics/src/chain.rs."""
+        """The simulator's step response: `ChainSettings::rising` of host/optics/src/chain.rs."""
+        if ns <= 0:
+            return 0.0
         led, amplifier = edge_ns / math.log(9), 1e3 / (2 * math.pi * bandwidth_mhz)
         rest = math.exp(-ns / amplifier)
         return 1 - rest - led / (led - amplifier) * (math.exp(-ns / led) - rest)
-
-    def model(self, sample: int, edge_ns: float, bandwidth_mhz: float) -> float:
-        return self.response((sample + 1) * SAMPLE_NS, edge_ns, bandwidth_mhz)
 
     def half(self, start: float) -> float:
         """Time at which the ADC's input passes half of the step that begins at `start`, in ns."""
@@ -54,19 +106,41 @@ class Chain:
             low, high = (middle, high) if self.response(middle, edge_ns, bandwidth_mhz) < 0.5 else (low, middle)
         return self.half(start) - start - low
 
-    def settled(self, edge_ns: float, bandwidth_mhz: float) -> tuple[list[float], list[float]]:
-        """Share of a step in samples 0 to 4, dark to lit and lit to dark, sampled in the model's phase."""
-        lit = self.at(self.adc, LIT_NS)
-        both = []
-        for start in (RISE_NS, FALL_NS):
-            delay = self.delay_ns(edge_ns, bandwidth_mhz, start)
-            shares = [self.at(self.adc, start + delay + (n + 1) * SAMPLE_NS) / lit for n in range(5)]
-            both.append(shares if start == RISE_NS else [1 - share for share in shares])
-        return both[0], both[1]
+    def share(self, start: float, ns: float) -> float:
+        """Share of the step that begins at `start` which the ADC's input has made `ns` later."""
+        passed = self.at(self.adc, start + ns) / self.at(self.adc, LIT_NS)
+        return passed if start == RISE_NS else 1 - passed
+
+    def fitted(self, bandwidth_mhz: float) -> tuple[Edges, float]:
+        """Edges and delays with which the simulator passes half of each step when the circuit does, and with which all
+        pairs have as much in common as in the circuit; and the delay that both edges share, which is latency.
+
+        The edge that begins first sets the phase in which the ADC samples both."""
+
+        def edge(start: float, phase: float | None) -> tuple[float, float]:
+            low, high = 1.0, 60.0
+            for _ in range(60):
+                edge_ns = (low + high) / 2
+                delay = self.delay_ns(edge_ns, bandwidth_mhz, start)
+                at = delay if phase is None else phase
+                circuit = pairs_see(lambda ns: 1 - self.share(start, at + ns))
+                model = pairs_see(lambda ns: 1 - self.response(ns + at - delay, edge_ns, bandwidth_mhz))
+                low, high = (edge_ns, high) if model < circuit else (low, edge_ns)
+            return edge_ns, delay
+
+        phase = min(edge(start, None)[1] for start in (RISE_NS, FALL_NS))
+        (rise, on), (fall, off) = (edge(start, phase) for start in (RISE_NS, FALL_NS))
+        first = min(on, off)
+        return Edges(rise, fall, on - first, off - first, bandwidth_mhz), first
+
+    def corner(self, phase: float) -> float:
+        """What pixel (0, 0) of a white sheet is off by with the circuit's edges, in units of white."""
+        rise, fall = (lambda ns, start=start: self.share(start, phase + ns) for start in (RISE_NS, FALL_NS))
+        return corner(rise, fall)
 
 
-def draw(chain: Chain, edge_ns: float, bandwidth_mhz: float, path: Path) -> None:
-    """Both steps of the circuit, the model and its samples, as SVG."""
+def draw(chain: Chain, edges: Edges, phase: float, path: Path) -> None:
+    """Both steps of the circuit, those of the simulator and its samples, as SVG."""
     left, bottom = 50, HEIGHT - 40
 
     def point(ns: float, share: float) -> str:
@@ -77,17 +151,13 @@ def draw(chain: Chain, edge_ns: float, bandwidth_mhz: float, path: Path) -> None
         return f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5" {dash}/>'
 
     times = [0.5 * i for i in range(2 * SPAN_NS + 1)]
-    lit = chain.at(chain.adc, LIT_NS)
     curves = []
-    for start, colour, fall in ((RISE_NS, "#c33", False), (FALL_NS, "#36c", True)):
-        delay = chain.delay_ns(edge_ns, bandwidth_mhz, start)
-        shares = [chain.at(chain.adc, start + delay + ns) / lit for ns in times]
-        curves.append(line([(ns, 1 - s if fall else s) for ns, s in zip(times, shares)], colour))
-    model = [(ns, chain.response(ns, edge_ns, bandwidth_mhz)) for ns in times]
-    curves.append(line(model, "#000", 'stroke-dasharray="4 3"'))
-    for n in range(SPAN_NS // SAMPLE_NS):
-        x, y = point((n + 1) * SAMPLE_NS, chain.model(n, edge_ns, bandwidth_mhz)).split(",")
-        curves.append(f'<circle cx="{x}" cy="{y}" r="3"/>')
+    for start, colour, model in ((RISE_NS, "#c33", edges.rising), (FALL_NS, "#36c", edges.falling)):
+        curves.append(line([(ns, chain.share(start, phase + ns)) for ns in times], colour))
+        curves.append(line([(ns, model(ns)) for ns in times], colour, 'stroke-dasharray="4 3"'))
+        for n in range(SPAN_NS // SAMPLE_NS):
+            x, y = point((n + 1) * SAMPLE_NS, model((n + 1) * SAMPLE_NS)).split(",")
+            curves.append(f'<circle cx="{x}" cy="{y}" r="3" fill="{colour}"/>')
     grid = []
     for share in (0, 0.5, 1):
         x, y = point(0, share).split(",")
@@ -96,7 +166,7 @@ def draw(chain: Chain, edge_ns: float, bandwidth_mhz: float, path: Path) -> None
     for ns in range(0, SPAN_NS + 1, SAMPLE_NS):
         grid.append(f'<text x="{point(ns, 0).split(",")[0]}" y="{bottom + 16}" text-anchor="middle">{ns}</text>')
     words = [("#c33", "circuit, dark to lit"), ("#36c", "circuit, lit to dark, turned over"),
-             ("#000", "simulator, and its samples")]
+             ("#000", "dashed: simulator, and its samples")]
     legend = [f'<text x="340" y="{150 + 18 * i}" fill="{colour}">{text}</text>'
               for i, (colour, text) in enumerate(words)]
     axis = (f'<text x="{WIDTH / 2}" y="{HEIGHT - 6}" text-anchor="middle">ns after the line, '

@@ -1,0 +1,98 @@
+//! What an image shows of LEDs that rise unlike they fall, and of a supply that sags: through the whole virtual camera,
+//! without noise.
+
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+use nirspi::capture::Progress;
+use nirspi_optics::{CameraModel, ChainSettings, Scene};
+use nirspi_recon::{Order, reconstruct};
+use nirspi_virtual::{VirtualOptics, calibrate_against_white, shoot};
+use std::ops::ControlFlow;
+
+/// The circuit's, boards/electronics/camera.toml.
+const EDGES: &str = "[leds]\nrise_ns = 12.76\nfall_ns = 16.36\nturn_on_delay_ns = 1.22\n";
+
+/// Grey levels that differ from LED to LED.
+fn grey() -> Scene {
+    Scene::new((0..1024).map(|i| (i * 7919 % 1000) as f32 / 1000.0).collect(), 32, 48.0).unwrap()
+}
+
+/// The image of all patterns in units of the light of one LED on white, and the light that each LED would give.
+fn image(camera: &str, scene: Scene, order: &Order) -> (Vec<f64>, Vec<f64>, ChainSettings) {
+    let camera = CameraModel::parse(camera).unwrap();
+    let optics = VirtualOptics::of(&camera, scene, 300.0).unwrap().noiseless();
+    let settling = calibrate_against_white(&optics, 1).unwrap();
+    let setup = optics.setup(order, 1.0).unwrap();
+    let mut go_on = |_: &Progress| ControlFlow::Continue(());
+    let shot = shoot(&optics, setup, &settling, 12, 1, &mut go_on).unwrap();
+    let unit = optics.chain().electrons_per_count / optics.budget().electrons_per_led;
+    let image = reconstruct::hadamard(&shot.measurements().unwrap());
+    let pixels = image.pixels().iter().map(|&counts| f64::from(counts) * unit).collect();
+    let light = optics.footprint().weights().iter().map(|&weight| f64::from(weight)).collect();
+    (pixels, light, *optics.chain())
+}
+
+/// The largest difference of two images, all pixels but the first.
+fn largest_of_rest(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).skip(1).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_difference_of_rise_and_fall_is_in_pixel_0_0_alone() {
+    for order in [Order::CakeCutting, Order::ZigZag] {
+        // Of a scene with structure, pixel (0, 0) also shows what neighbouring patterns have in common. Of a white sheet, all
+        // pairs are rounded alike, because no noise dithers them.
+        let scenes: [(fn() -> Scene, f64); 2] = [(grey, 0.08), (Scene::white, 0.05)];
+        for (scene, tolerance) in scenes {
+            let (alike, light, _) = image("", scene(), &order);
+            let (seen, _, chain) = image(EDGES, scene(), &order);
+            // What is missing of rising light less what is left of falling light, a quarter of it in each difference.
+            let rest = |part: &dyn Fn(u32) -> f64, slot: u32| {
+                (2..5).map(|n| 1.0 - part(5 * slot + n)).sum::<f64>() / 3.0
+            };
+            let common =
+                |slot| rest(&|n| chain.rising(n), slot) - rest(&|n| chain.falling(n), slot);
+            let total: f64 = light.iter().sum();
+            // The host's taps, 1 - 1.5 and -0.5 of what the rise leaves, pass their sum of what all pairs have in common.
+            let kept = 1.0 - 2.0 * rest(&|n| chain.rising(n), 0);
+            let expected = light[0] + total * (common(0) - common(1)) / 4.0 / kept;
+            assert!(expected < -1.0, "{expected}");
+            assert!((alike[0] - light[0]).abs() < 0.02, "{order:?}: {} {}", alike[0], light[0]);
+            assert!(
+                (seen[0] / expected - 1.0).abs() < tolerance,
+                "{order:?}: {} {expected}",
+                seen[0]
+            );
+            // The calibration knows the rise alone, and undoes too little of the fall: a scale, and what neighbours share.
+            let error = largest_of_rest(&seen, &alike);
+            assert!(error < 0.05, "{order:?}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_sagging_supply_takes_half_from_the_pixel_and_half_from_its_tile() {
+    let sag = 0.1;
+    let (stiff, ..) = image("", grey(), &Order::CakeCutting);
+    let (seen, ..) = image(&format!("[leds]\ntile_sag = {sag}"), grey(), &Order::CakeCutting);
+    let tile_mean = |at: usize| {
+        let (row, column) = (at / 32 / 8 * 8, at % 32 / 8 * 8);
+        (0..64).map(|i| stiff[(row + i / 8) * 32 + column + i % 8]).sum::<f64>() / 64.0
+    };
+    let expected: Vec<f64> =
+        (0..1024).map(|at| stiff[at] - sag / 2.0 * (stiff[at] + tile_mean(at))).collect();
+    let error = largest_of_rest(&seen, &expected);
+    assert!(error < 0.01, "{error}");
+}
+
+/// Lines that inject nothing give the image of a perfect shield; 1 fF from each line is seen in the first column.
+#[test]
+fn crosstalk_of_the_row_lines_is_in_the_first_column() {
+    let (shielded, ..) = image("", Scene::white(), &Order::CakeCutting);
+    let (seen, ..) = image("[leds]\nline_crosstalk_ff = 0.02", Scene::white(), &Order::CakeCutting);
+    let off = |at: usize| seen[at] - shielded[at];
+    let column: f64 = (0..32).map(|row| off(row * 32).abs()).sum::<f64>() / 32.0;
+    let rest: f64 =
+        (0..1024).filter(|at| at % 32 != 0).map(|at| off(at).abs()).sum::<f64>() / 992.0;
+    assert!(column > 10.0 * rest, "{column} {rest}");
+}
