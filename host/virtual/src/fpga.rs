@@ -334,6 +334,22 @@ mod tests {
     const CIRCUIT: &str = "[leds]\nrise_ns = 12.8\nfall_ns = 16.3\nturn_on_delay_ns = 1.4\ntile_sag = 0.0165\n\
                            line_crosstalk_ff = 1";
 
+    /// The chain holds the light of lines that do not change.
+    #[test]
+    fn what_changes_in_front_of_the_leds_is_seen_without_a_change_of_the_lines() {
+        let camera = CameraModel::parse(CIRCUIT).unwrap();
+        let optics = VirtualOptics::of(&camera, Scene::white(), 300.0).unwrap().noiseless();
+        let mut detector = optics.fpga(1).unwrap().detector;
+        let lines = Lines { rows: 0, columns: 0, enable: true };
+        let settled = |detector: &mut Detector| {
+            (0..100).map(|_| detector.sample(lines).code).last().unwrap_or_default()
+        };
+        let white = settled(&mut detector);
+        detector.relight(&[0.0; 1024], 26.0);
+        let black = settled(&mut detector);
+        assert!(white > black + 5000, "{white} {black}");
+    }
+
     /// In rain the drops move three times within the run, in whichever stretches the time passes.
     #[test]
     fn the_same_light_comes_in_long_stretches_and_clock_by_clock() {
