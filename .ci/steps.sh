@@ -43,7 +43,7 @@ beside=(gpu page web tcp recordings emulation mie)
 by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
     "licences        licences, sources and bans of all dependencies; crates.io"
-    "flash           probe-rs knows every board's chip"
+    "flash           probe-rs knows every board's chip, and the program its options"
     "mutations-all   every deliberate fault in the RTL is seen, and every law can be broken"
     "proofs-all      the same with every deliberate fault; PyPI"
     "gpu-program     networks and the program on software Vulkan; Debian"
@@ -452,7 +452,9 @@ step_dissector() {
 
 step_flash() {
     # Without optimisation and GPUs: it is built for this alone.
-    cargo test --locked -p nirspi-update --features flash --lib --config 'profile.dev.package."*".opt-level=0' -- flash
+    local quick='profile.dev.package."*".opt-level=0'
+    cargo test --locked -p nirspi-update --features flash --lib --config "$quick" -- flash
+    cargo test --locked -p nirspi-cli --features flash --test cli --config "$quick" -- flash
 }
 
 step_mie() {

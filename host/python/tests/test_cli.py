@@ -49,6 +49,25 @@ def test_reconstruct_and_enhance(cli, wing, tmp_path, method):
     assert sharp.warnings == report["warnings"]
 
 
+def test_the_parts_of_a_split_capture_are_the_frames_of_one(cli, tmp_path):
+    capture = ["capture", "--camera", "virtual", "--frames", "300", "--seed", "3", "--no-calibration"]
+    capture += ["--adc-latency", "6", "--out"]
+    run(cli, *capture, tmp_path / "whole.mcap")
+    run(cli, *capture, tmp_path / "rec.mcap", "--split", "1MB")
+    whole = ns.Recording(tmp_path / "whole.mcap")
+    files = sorted(tmp_path.glob("rec-*.mcap"))
+    parts = [ns.Recording(file) for file in files]
+    assert len(parts) > 1 and all(len(part) for part in parts)
+    for field in ("y", "sequence", "device_time_us"):
+        assert (np.concatenate([getattr(part, field) for part in parts]) == getattr(whole, field)).all(), field
+    # A program that reads exported files gets the same frames of each part.
+    exported = []
+    for file in [tmp_path / "whole.mcap", *files]:
+        run(cli, "export", file, "--to", "npz", "--out", file.with_suffix(".npz"))
+        exported.append(np.load(file.with_suffix(".npz"))["frames"])
+    assert (np.concatenate(exported[1:]) == exported[0]).all()
+
+
 @pytest.mark.parametrize("model", ["diffusion", "wiener"])
 def test_deblur(cli, tmp_path, model, random):
     x = random.random((3, 64, 64), np.float32)

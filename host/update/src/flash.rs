@@ -122,8 +122,7 @@ pub fn choose<'p>(probes: &'p [Probe], wanted: Option<&str>) -> Result<&'p Probe
     let there = || probes.iter().map(Probe::selector).collect::<Vec<_>>().join(", ");
     let meant = |probe: &&Probe| {
         wanted.is_none_or(|wanted| {
-            probe.selector() == wanted.to_lowercase()
-                || probe.selector() == wanted
+            probe.selector().eq_ignore_ascii_case(wanted)
                 || probe.info.serial_number.as_deref() == Some(wanted)
         })
     };
@@ -213,7 +212,33 @@ fn place(operation: ProgressOperation) -> (usize, &'static str) {
 mod tests {
     use super::*;
     use nirspi::boards::BOARDS;
+    use probe_rs::probe::stlink::StLinkFactory;
     use std::io::Write;
+
+    /// An ST-LINK with this serial number.
+    fn st_link(serial: &str, permitted: bool) -> Probe {
+        let serial = Some(serial.to_owned());
+        let info =
+            DebugProbeInfo::new("ST-LINK", 0x0483, 0x374e, serial, &StLinkFactory, None, false);
+        Probe { info, permitted }
+    }
+
+    #[test]
+    fn the_probe_that_was_named_is_the_one_that_is_used() {
+        let probes = [st_link("00AB12", true), st_link("00AB13", true), st_link("00AB14", false)];
+        for wanted in ["0483:374e:00AB13", "0483:374E:00AB13", "00AB13"] {
+            let chosen = choose(&probes, Some(wanted)).unwrap();
+            assert_eq!(chosen.selector(), "0483:374e:00AB13", "{wanted}");
+        }
+        let refused = |wanted| choose(&probes, wanted).unwrap_err();
+        assert!(matches!(refused(None), FlashingError::SeveralProbes(_)));
+        // The nearest wrong one: a serial number that begins so.
+        for wanted in ["00AB1", "0483:374e:00AB1", "0483:374f:00AB13"] {
+            assert!(matches!(refused(Some(wanted)), FlashingError::NoSuchProbe { .. }), "{wanted}");
+        }
+        assert!(matches!(refused(Some("00AB14")), FlashingError::Permission(_)));
+        assert_eq!(choose(&probes[..1], None).unwrap().selector(), "0483:374e:00AB12");
+    }
 
     #[test]
     fn without_a_probe_there_is_one_line_on_what_to_check() {

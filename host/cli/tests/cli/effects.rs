@@ -6,6 +6,11 @@ use nirspi::session::{IgnorePackets, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::RunLength;
+use nirspi_wire::host_port::READ_REGISTER;
+use nirspi_wire::register::{IDENTITY, Register};
+use nirspi_wire::tunnel::{CRC_BYTES, Lines, REPLY_HEAD_BYTES, Request};
+use std::io::{Read, Write};
+use std::net::TcpListener;
 use std::time::Duration;
 
 /// The recording of the wire protocol's first version.
@@ -110,4 +115,27 @@ fn images_of_a_share_of_the_patterns_are_judged_by_the_measurement_that_was_name
     let psnr = |report: &serde_json::Value| report["rows"][0]["psnr_db"].as_f64().unwrap();
     assert!((psnr(&against) - psnr(&alone)).abs() > 0.01, "{alone} {against}");
     judged(&["--against", "other.npz"]).failed(1, &["do not show the same scene"]);
+}
+
+/// An emulator listens, and the FPGA of the virtual camera answers its reads.
+#[test]
+fn an_emulated_board_finds_the_fpga_behind_its_tunnel() {
+    let bench = Bench::new();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let mut fpga = bench.start(&["virtual", "--tunnel", &address]);
+    let (mut board, _) = listener.accept().unwrap();
+    fpga.says("FPGA behind ");
+    let identity = Register::Identity.address();
+    let request = Request { opcode: READ_REGISTER, number: 7, address: identity, argument: 0 };
+    board.write_all(&request.to_bytes()).unwrap();
+    let mut reply = [0; REPLY_HEAD_BYTES + 4 + CRC_BYTES];
+    board.read_exact(&mut reply).unwrap();
+    let (number, lines) = Lines::from_reply_head(*reply.first_chunk().unwrap());
+    assert!(number == 7 && lines.interlock_closed && !lines.frame_ready, "{lines:?}");
+    assert_eq!(reply[REPLY_HEAD_BYTES..][..4], IDENTITY.to_le_bytes());
+    drop(board);
+    fpga.says("the emulator disconnected");
+    drop(listener);
+    bench.run(&["virtual", "--tunnel", &address]).failed(1, &[&address, "no emulator there"]);
 }

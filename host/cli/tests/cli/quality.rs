@@ -1,6 +1,6 @@
 //! `nirspi eval quality` on a few made-up characters: what is written, and on what it rests.
 
-use crate::bench::{Bench, npz};
+use crate::bench::{Bench, Measured, npz};
 
 /// Six images of bars, two of each of three writers.
 fn stack() -> Vec<u8> {
@@ -21,6 +21,8 @@ fn every_row_is_measured_on_the_same_unseen_images() {
     let bench = Bench::new();
     bench.write("own.npz", &stack());
     bench.write("unseen.json", br#"{"own": [3, 1]}"#);
+    std::fs::create_dir(bench.path("measured")).unwrap();
+    bench.write("measured/disc.npz", &Measured::new(32).npz());
     let arguments = [
         "eval",
         "quality",
@@ -28,6 +30,8 @@ fn every_row_is_measured_on_the_same_unseen_images() {
         "own.npz",
         "--held-out",
         "unseen.json",
+        "--spi",
+        "measured",
         "--count",
         "2",
         "--sampler-count",
@@ -58,6 +62,10 @@ fn every_row_is_measured_on_the_same_unseen_images() {
     let none = depth.iter().filter(|row| row["depth"] == "none");
     assert!(none.clone().all(|row| row["psnr_minus_none_db"]["value"] == 0.0), "{report}");
     assert_eq!(none.count(), 16);
+    // The measurement in the folder that `--spi` names is among the scenes, and it has no known truth.
+    let others = report["others"].as_array().unwrap();
+    let disc = others.iter().find(|case| case["name"] == "disc (measured)").unwrap();
+    assert!(disc["psnr_after_db"].is_null() && disc["changed"].as_f64().unwrap() > 0.0, "{disc}");
     for name in ["blur.png", "noise.png", "steps.png", "others.png", "depth.png", "quality.json"] {
         assert!(bench.path("quality").join(name).is_file(), "{name}");
     }

@@ -72,3 +72,20 @@ fn a_missing_firmware_file_says_how_to_build_it() {
     bench.run(&flash).failed(1, &["boards/target", "bash boards/build.sh nucleo-u5a5zj-q"]);
     bench.run(&["flash", "--list"]).succeeded();
 }
+
+/// Without a board at hand: what was named is what is read and looked for.
+#[cfg(feature = "flash")]
+#[test]
+fn flash_reads_the_file_and_looks_for_the_probe_that_were_named() {
+    let bench = Bench::new();
+    let flash = |more: &[&str]| {
+        bench.run(&[&["flash", "--board", "nucleo-u5a5zj-q"][..], more].concat())
+    };
+    flash(&["--elf", "missing.elf"]).failed(1, &["missing.elf"]);
+    bench.write("own.elf", b"not read before a probe is found");
+    let refused = flash(&["--elf", "own.elf", "--probe", "ffff:ffff:none"]);
+    let probes = bench.run(&["flash", "--list"]).succeeded().stdout;
+    // A machine with a probe names it beside the one that is not there.
+    let words = if probes.contains("no debug probe:") { "ST-LINK" } else { "ffff:ffff:none" };
+    refused.failed(1, &["no debug probe", words]);
+}
