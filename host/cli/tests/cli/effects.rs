@@ -124,8 +124,8 @@ fn an_emulated_board_finds_the_fpga_behind_its_tunnel() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let mut fpga = bench.start(&["virtual", "--tunnel", &address]);
-    let (mut board, _) = listener.accept().unwrap();
     fpga.says("FPGA behind ");
+    let (mut board, _) = listener.accept().unwrap();
     let identity = Register::Identity.address();
     let request = Request { opcode: READ_REGISTER, number: 7, address: identity, argument: 0 };
     board.write_all(&request.to_bytes()).unwrap();
