@@ -712,6 +712,15 @@ def silent(told):
     page.evaluate("() => { isSilent = true; }")
     expect(leds).to_have_text("LEDs unknown, last seen 2 s ago: no answer from the camera", timeout=2000)
     page.evaluate("() => { isSilent = false; }")
+    # The LEDs are on in a message that was two seconds old when it came, and nothing follows. Its age counts before the question
+    # without an answer is given up.
+    told.tell(camera={"phase": "measuring", "leds": "on", "leds_age_ms": 0}, light={"allowed": True})
+    page.evaluate("() => { isSilent = true; }")
+    page.wait_for_function("() => asks.length")
+    page.evaluate("() => tell(told, 2000)")
+    expect(leds).to_have_text(re.compile(r"LEDs unknown, last seen [23] s ago: no answer from nirspi serve"), timeout=1500)
+    assert {row[1] for row in rows(page, "rates")} == {"–"}, rows(page, "rates")
+    page.evaluate("() => { isSilent = false; }")
     # The server's own link to the camera is silent.
     told_of = told.tell(camera={"leds": "unknown", "leds_age_ms": 4100})
     assert told_of == "LEDs unknown, last seen 4 s ago: no answer from the camera", told_of

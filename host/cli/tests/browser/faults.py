@@ -138,7 +138,6 @@ FAULTS = [
     ("the server's reason is not shown", "connection.js", "error.refusal ?? GONE.line", "GONE.line", "stream"),
     ("a hidden page goes on asking", "connection.js", "document.hidden || isHushed()", "isHushed()", "stream"),
     ("a state has no age", "main.js", "if (!why && age() <= FRESH_MS) return light.age(age());", "if (!why) return light.age(age());", "stream"),
-    ("a silent link has no age", "main.js", "if (!why && age() <= FRESH_MS) return light.age(age());", "if (!why) return light.age(age());", "silent"),
     ("the age of the camera's word is left out", "light.js", "offAge + stateAge <= FRESH_MS", "stateAge <= FRESH_MS", "stream"),
     ("an old message counts as new", "connection.js", "asked.map(time => time - age)", "asked", "stream"),
     ("the rates of a silent program stay", "main.js", "facts.showGone();", "", "stream"),

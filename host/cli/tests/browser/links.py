@@ -92,6 +92,14 @@ def silent(browser, address):
     relay.listener.close()
 
 
+# The median time from an answer to the next question of a page; none without two answers.
+WAIT_MS = """() => {
+  const asked = performance.getEntriesByType("resource").filter(of => of.name.includes("/api/next") && of.responseEnd);
+  const waits = asked.slice(1).map((next, at) => next.startTime - asked[at].responseEnd).sort((a, b) => a - b);
+  return waits.length ? waits[waits.length >> 1] : 9999;
+}"""
+
+
 def windows(browser, address):
     """Twenty windows of the page: each one loads, shows the LEDs and stops them; one gets every image."""
     context = browser.new_context()
@@ -110,9 +118,13 @@ def windows(browser, address):
         page.locator("#start").click()
         waits(address, "on")
         expect(page.locator("#leds")).to_have_text("LEDs on")
+    for page in pages:
+        page.evaluate("() => performance.clearResourceTimings()")
     pages[0].wait_for_timeout(4000)
-    rates = sorted(float(page.locator("#rates dd").nth(2).inner_text()) for page in pages)
-    assert rates[-2] <= 3, f"images a second of each window: {rates}"
+    rates = sorted(page.locator("#rates dd").nth(2).inner_text() for page in pages)
+    # On a busy machine no window has many images. How long a window waits before it asks again is its own choice.
+    waits_ms = sorted(page.evaluate(WAIT_MS) for page in pages)
+    assert waits_ms[0] < 400 <= waits_ms[1], f"ms from an answer to the next question, of each window: {waits_ms}"
     context.close()
     print(f"20 windows: LEDs off {slowest:.2f} s after Escape; images a second of each window: {rates}")
 
