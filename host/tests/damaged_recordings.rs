@@ -10,7 +10,7 @@ use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::samples::{Samples, Width};
-use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, version};
+use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode};
 use std::path::{Path, PathBuf};
 
 const RUN: u16 = 3;
@@ -25,15 +25,8 @@ fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
 fn recorded(folder: &Path) -> PathBuf {
     let path = folder.join("rec.mcap");
     let identity = CameraIdentity {
-        protocol: version::CURRENT,
-        firmware: "0.3.1".into(),
-        gateware: "1.2.0".into(),
-        board: "virtual".into(),
-        serial: "A-17".into(),
-        adc_hz: 125_000_000,
-        adc_bits: 14,
-        wavelength_nm: 1550,
         capabilities: vec!["depth".into()],
+        ..CameraIdentity::current("virtual", "A-17")
     };
     let setup = MeasurementSetup::new(&Order::CakeCutting, 0.05).unwrap();
     let target = Target::New(path.clone());

@@ -11,9 +11,7 @@ use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::samples::{Samples, Width, Words};
-use nirspi_wire::{
-    Depth, DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open, version,
-};
+use nirspi_wire::{Depth, DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -46,15 +44,8 @@ fn frame(sequence: u32, patterns: usize) -> Vec<u8> {
 fn recorded(folder: &Path, is_whole: bool) -> PathBuf {
     let path = folder.join("rec.mcap");
     let identity = CameraIdentity {
-        protocol: version::CURRENT,
-        firmware: "0.3.1".into(),
-        gateware: "1.2.0".into(),
-        board: "nucleo-u5a5zj-q".into(),
-        serial: "A-17".into(),
-        adc_hz: 125_000_000,
-        adc_bits: 14,
-        wavelength_nm: 1550,
         capabilities: vec!["depth".into(), "boot loader".into()],
+        ..CameraIdentity::current("nucleo-u5a5zj-q", "A-17")
     };
     let mut setup = MeasurementSetup::new(&Order::CakeCutting, 0.25).unwrap();
     setup.adc_latency = 6;

@@ -16,7 +16,7 @@ use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::samples::{Samples, Width};
-use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open, version};
+use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open};
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -36,17 +36,7 @@ fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
 /// A recording of a run. With damage, one frame of three is whole, so that most changes of file would be in
 /// a gap; every 97th frame is lost, and every 83rd is followed by a damaged packet that is no frame.
 fn recorded(path: &Path, frames: u32, is_damaged: bool) {
-    let identity = CameraIdentity {
-        protocol: version::CURRENT,
-        firmware: "0.3.1".into(),
-        gateware: "1.2.0".into(),
-        board: "nucleo-u5a5zj-q".into(),
-        serial: "A-17".into(),
-        adc_hz: 125_000_000,
-        adc_bits: 14,
-        wavelength_nm: 1550,
-        capabilities: Vec::new(),
-    };
+    let identity = CameraIdentity::current("nucleo-u5a5zj-q", "A-17");
     let setup = MeasurementSetup::new(&Order::CakeCutting, 0.25).unwrap();
     let patterns = setup.rows.len();
     let target = Target::New(path.to_owned());

@@ -121,10 +121,7 @@ fn look(bus: &mut impl FpgaBus) -> Result<Result<u32, Fault>, Fault> {
 /// Version of the gateware; 0.0.0 if no gateware answers.
 pub(crate) fn version(bus: &mut impl FpgaBus) -> Version {
     match (identify(bus), read(bus, Register::Version)) {
-        (Ok(()), Ok(word)) => {
-            let [_, major, minor, patch] = word.to_be_bytes();
-            Version(major, minor, patch)
-        }
+        (Ok(()), Ok(word)) => Version::of_register(word),
         _ => Version(0, 0, 0),
     }
 }

@@ -5,9 +5,8 @@
 //! that was read and the value that was expected.
 
 use crate::session::{Listener, Session, SessionError};
-use crate::versions::of_register;
-use nirspi_wire::ADC_HZ;
 use nirspi_wire::register::{Design, IDENTITY, Register, clocks, has_this_map, sampling};
+use nirspi_wire::{ADC_HZ, Version};
 use std::fmt;
 use thiserror::Error;
 
@@ -68,8 +67,8 @@ pub enum FpgaProblem {
     #[error(
         "the FPGA runs gateware {}, and this program knows {}: load the gateware of this version (nirspi gateware \
          FILE, or nirspi update)",
-        of_register(*.found),
-        of_register(Register::Version.reset())
+        Version::of_register(*.found),
+        Version::of_register(Register::Version.reset())
     )]
     Version {
         /// The version register.

@@ -2,7 +2,7 @@
 
 use nirspi_files::boards::Board;
 use nirspi_files::identity::CameraIdentity;
-use nirspi_wire::{register::Register, version};
+use nirspi_wire::{Version, register::Register, version};
 use serde::Serialize;
 use std::cmp::Ordering;
 
@@ -35,13 +35,6 @@ pub struct Part {
     pub advice: Option<String>,
 }
 
-/// A version in the FPGA's register: `major << 16 | minor << 8 | patch`.
-#[must_use]
-pub fn of_register(value: u32) -> String {
-    let [_, major, minor, patch] = value.to_be_bytes();
-    format!("{major}.{minor}.{patch}")
-}
-
 /// The version numbers in `text`, for comparing.
 fn numbers(text: &str) -> Vec<u32> {
     text.split('.').map(|part| part.parse().unwrap_or(0)).collect()
@@ -67,7 +60,7 @@ fn part(
 #[must_use]
 pub fn compare(camera: &CameraIdentity, map: Option<u32>) -> Vec<Part> {
     let program = env!("CARGO_PKG_VERSION");
-    let gateware = of_register(Register::Version.reset());
+    let gateware = Version::of_register(Register::Version.reset()).to_string();
     let update_program = |version: &str| format!("update this program to {version} or newer");
     let firmware = |compared| match compared {
         Match::Newer => update_program(&camera.firmware),
@@ -83,7 +76,9 @@ pub fn compare(camera: &CameraIdentity, map: Option<u32>) -> Vec<Part> {
         part("firmware", &camera.firmware, program, firmware),
         part("gateware", &camera.gateware, &gateware, bitstream),
     ];
-    parts.extend(map.map(|map| part("register map", &of_register(map), &gateware, bitstream)));
+    parts.extend(map.map(|map| {
+        part("register map", &Version::of_register(map).to_string(), &gateware, bitstream)
+    }));
     parts
 }
 
@@ -105,17 +100,7 @@ mod tests {
     use super::*;
 
     fn camera(change: impl FnOnce(&mut CameraIdentity)) -> CameraIdentity {
-        let mut camera = CameraIdentity {
-            protocol: version::CURRENT,
-            firmware: env!("CARGO_PKG_VERSION").into(),
-            gateware: of_register(Register::Version.reset()),
-            board: "nucleo-u5a5zj-q".into(),
-            serial: "A1".into(),
-            adc_hz: 125_000_000,
-            adc_bits: 14,
-            wavelength_nm: 1550,
-            capabilities: Vec::new(),
-        };
+        let mut camera = CameraIdentity::current("nucleo-u5a5zj-q", "A1");
         change(&mut camera);
         camera
     }

@@ -8,8 +8,8 @@ use super::report::ReportArgs;
 use anyhow::{Context, Result};
 use nirspi::address::CameraAddress;
 use nirspi::session::Session;
-use nirspi::versions::of_register;
 use nirspi_update::gateware;
+use nirspi_wire::Version;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -52,7 +52,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let loaded = gateware::load(&mut session, &bitstream, &mut |bytes| bar.set(bytes));
     drop(bar);
     let version = loaded.with_context(|| file.to_string())?;
-    let report = Report { bytes: bitstream.len(), gateware: of_register(version) };
+    let report =
+        Report { bytes: bitstream.len(), gateware: Version::of_register(version).to_string() };
     args.report.print_answer(&report, |report| {
         print::line(format_args!("the FPGA runs gateware {}", report.gateware))
     })

@@ -1,7 +1,8 @@
 //! The identity of a camera: who it is, and what it can do.
 
 use crate::causes::printable;
-use nirspi_wire::{Capabilities, Identity};
+use nirspi_wire::register::Register;
+use nirspi_wire::{ADC_BITS, ADC_HZ, Capabilities, Identity, Version, WAVELENGTH_NM, version};
 use serde::{Deserialize, Serialize};
 
 /// The identity of a camera: the wire's [`Identity`], owned.
@@ -27,6 +28,24 @@ pub struct CameraIdentity {
     /// does not report capabilities.
     #[serde(default)]
     pub capabilities: Vec<String>,
+}
+
+impl CameraIdentity {
+    /// What a board of this name says of itself with firmware and gateware of this program's version.
+    #[must_use]
+    pub fn current(board: &str, serial: &str) -> Self {
+        Self {
+            protocol: version::CURRENT,
+            firmware: env!("CARGO_PKG_VERSION").to_owned(),
+            gateware: Version::of_register(Register::Version.reset()).to_string(),
+            board: board.to_owned(),
+            serial: serial.to_owned(),
+            adc_hz: ADC_HZ,
+            adc_bits: ADC_BITS,
+            wavelength_nm: WAVELENGTH_NM,
+            capabilities: Vec::new(),
+        }
+    }
 }
 
 impl From<&Identity<'_>> for CameraIdentity {

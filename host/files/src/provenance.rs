@@ -378,17 +378,7 @@ pub(crate) mod tests {
     #[test]
     fn a_camera_in_an_emulator_is_simulated_and_one_on_a_board_measures() {
         let of = |board: &str| {
-            let camera = CameraIdentity {
-                protocol: 1,
-                firmware: "0.1.0".into(),
-                gateware: "0.4.0".into(),
-                board: board.into(),
-                serial: "A1".into(),
-                adc_hz: 125_000_000,
-                adc_bits: 14,
-                wavelength_nm: 1550,
-                capabilities: Vec::new(),
-            };
+            let camera = CameraIdentity::current(board, "A1");
             Taken::by(&camera).origin
         };
         assert_eq!((of("virtual"), of("mps2-an505")), (Origin::Simulated, Origin::Simulated));

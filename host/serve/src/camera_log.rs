@@ -220,17 +220,7 @@ mod tests {
     use super::*;
 
     fn identity() -> CameraIdentity {
-        CameraIdentity {
-            protocol: 1,
-            firmware: "1".to_owned(),
-            gateware: "1".to_owned(),
-            board: "test".to_owned(),
-            serial: "T".to_owned(),
-            adc_hz: 1,
-            adc_bits: 1,
-            wavelength_nm: 1,
-            capabilities: Vec::new(),
-        }
+        CameraIdentity::current("test", "T")
     }
 
     #[test]

@@ -21,8 +21,7 @@ use nirspi::files::FileError;
 use nirspi::fpga::Fpga;
 use nirspi::identity::CameraIdentity;
 use nirspi::session::{IgnorePackets, Session};
-use nirspi::versions::of_register;
-use nirspi_wire::{register::Design, version};
+use nirspi_wire::{Version, register::Design, version};
 pub use release::{Asset, Component, MANIFEST, Manifest, Release, Source, pack};
 use serde::Serialize;
 use std::fmt;
@@ -268,7 +267,11 @@ pub fn load_gateware(
     progress: &mut dyn FnMut(u32),
 ) -> Result<(), UpdateError> {
     let register = gateware::load(session, &change.content, progress)?;
-    expect(Component::Gateware, &of_register(register), &change.asset.version)?;
+    expect(
+        Component::Gateware,
+        &Version::of_register(register).to_string(),
+        &change.asset.version,
+    )?;
     let fpga = Fpga::ask(session, &mut IgnorePackets).map_err(GatewareError::from)?;
     match fpga.check_gateware() {
         Ok(Design::BringUp) => Err(UpdateError::BringUp { file: change.asset.file.clone() }),

@@ -8,9 +8,8 @@ use super::UpdateError;
 use nirspi::boards::BOARDS;
 use nirspi::files::output::OutputDir;
 use nirspi::files::{FileError, read_at_most, read_text};
-use nirspi::versions::of_register;
 use nirspi_mcu::staging;
-use nirspi_wire::{register::Register, version};
+use nirspi_wire::{Version, register::Register, version};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
@@ -256,7 +255,9 @@ pub fn pack(sources: &[Source], out: &Path) -> Result<Manifest, UpdateError> {
         }
         let (ending, version) = match component {
             Component::Firmware => ("elf", env!("CARGO_PKG_VERSION").to_owned()),
-            Component::Gateware => ("bit", of_register(Register::Version.reset())),
+            Component::Gateware => {
+                ("bit", Version::of_register(Register::Version.reset()).to_string())
+            }
         };
         let file = format!("{board}.{ending}");
         folder.write(&file, &bytes)?;

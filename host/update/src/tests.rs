@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::gateware::tests::{bitstream, camera};
-use nirspi_wire::register::Register;
 use std::fs;
 use std::path::Path;
 
@@ -30,15 +29,8 @@ fn release(folder: &Path) -> PathBuf {
 
 fn identity(change: impl FnOnce(&mut CameraIdentity)) -> CameraIdentity {
     let mut camera = CameraIdentity {
-        protocol: version::CURRENT,
         firmware: "0.0.9".into(),
-        gateware: of_register(Register::Version.reset()),
-        board: "nucleo-u5a5zj-q".into(),
-        serial: "A1".into(),
-        adc_hz: 125_000_000,
-        adc_bits: 14,
-        wavelength_nm: 1550,
-        capabilities: Vec::new(),
+        ..CameraIdentity::current("nucleo-u5a5zj-q", "A1")
     };
     change(&mut camera);
     camera

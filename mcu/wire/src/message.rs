@@ -19,6 +19,15 @@ pub const GATEWARE_CHUNK_MAX: usize = 2048;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Version(pub u8, pub u8, pub u8);
 
+impl Version {
+    /// The version in the FPGA's register: `major << 16 | minor << 8 | patch`.
+    #[must_use]
+    pub const fn of_register(value: u32) -> Self {
+        let [_, major, minor, patch] = value.to_be_bytes();
+        Self(major, minor, patch)
+    }
+}
+
 impl core::fmt::Display for Version {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "{}.{}.{}", self.0, self.1, self.2)

@@ -21,10 +21,9 @@ use crate::check::{Check, Limit, Verdict};
 use crate::fpga::{Fpga, FpgaProblem, Sampling};
 use crate::response::Settling;
 use crate::session::{IgnorePackets, Session, SessionError};
-use crate::versions::of_register;
 use nirspi_files::causes;
 use nirspi_wire::register::{IDENTITY, clocks};
-use nirspi_wire::{ADC_HZ, ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport};
+use nirspi_wire::{ADC_HZ, ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport, Version};
 use std::time::Duration;
 
 /// Least step of all LEDs together, as a share of the ADC's range. With a smaller step, a single
@@ -176,7 +175,7 @@ fn device(report: SelfTestReport, fpga: &Fpga) -> Vec<Check> {
             told(fpga.check_identity().map(|()| format!("{IDENTITY:#010x} as expected")))
         }
         SelfTestReport::GATEWARE => told(fpga.check_gateware().map(|design| {
-            let version = of_register(fpga.version().unwrap_or_default());
+            let version = Version::of_register(fpga.version().unwrap_or_default());
             format!("{version}, {design}")
         })),
         SelfTestReport::ADC_CLOCK => told(fpga.check_clock().map(|mhz| {

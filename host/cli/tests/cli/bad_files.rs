@@ -142,17 +142,7 @@ fn a_recording_that_is_there_is_not_written_over() {
 
 /// A recording of one frame of 1024 samples whose setup or calibration is not what a camera or a burst gives.
 fn crafted(bench: &Bench, name: &str, setup: &MeasurementSetup, settling: &Settling) {
-    let identity = CameraIdentity {
-        protocol: 1,
-        firmware: "0.1.0".into(),
-        gateware: "0.1.0".into(),
-        board: "crafted".into(),
-        serial: "1".into(),
-        adc_hz: 125_000_000,
-        adc_bits: 14,
-        wavelength_nm: 1550,
-        capabilities: Vec::new(),
-    };
+    let identity = CameraIdentity::current("crafted", "1");
     let target = Target::New(bench.path(name));
     let mut recorder =
         Recorder::create(&target, &identity, setup, Some(settling), Some(7)).unwrap();

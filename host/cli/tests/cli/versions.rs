@@ -78,9 +78,8 @@ fn a_missing_firmware_file_says_how_to_build_it() {
 #[test]
 fn flash_reads_the_file_and_looks_for_the_probe_that_were_named() {
     let bench = Bench::new();
-    let flash = |more: &[&str]| {
-        bench.run(&[&["flash", "--board", "nucleo-u5a5zj-q"][..], more].concat())
-    };
+    let flash =
+        |more: &[&str]| bench.run(&[&["flash", "--board", "nucleo-u5a5zj-q"][..], more].concat());
     flash(&["--elf", "missing.elf"]).failed(1, &["missing.elf"]);
     bench.write("own.elf", b"not read before a probe is found");
     let refused = flash(&["--elf", "own.elf", "--probe", "ffff:ffff:none"]);

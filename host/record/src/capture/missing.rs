@@ -120,17 +120,7 @@ mod tests {
     use std::time::Duration;
 
     fn camera() -> CameraIdentity {
-        CameraIdentity {
-            protocol: 1,
-            firmware: "0.1.0".into(),
-            gateware: "0.4.0".into(),
-            board: "virtual".into(),
-            serial: "virtual-1".into(),
-            adc_hz: 125_000_000,
-            adc_bits: 14,
-            wavelength_nm: 1550,
-            capabilities: Vec::new(),
-        }
+        CameraIdentity::current("virtual", "virtual-1")
     }
 
     fn wrong_crc(packets: u64) -> FailedChecks {

@@ -445,17 +445,7 @@ mod tests {
     use nirspi_camera::account::LossCounters;
 
     fn identity() -> CameraIdentity {
-        CameraIdentity {
-            protocol: 1,
-            firmware: "0.1.0".into(),
-            gateware: "0.1.0".into(),
-            board: "virtual".into(),
-            serial: "1".into(),
-            adc_hz: 125_000_000,
-            adc_bits: 14,
-            wavelength_nm: 1550,
-            capabilities: Vec::new(),
-        }
+        CameraIdentity::current("virtual", "1")
     }
 
     fn setup() -> MeasurementSetup {

@@ -184,17 +184,7 @@ mod tests {
     #[test]
     fn a_file_that_follows_another_has_its_clock() {
         let folder = tempfile::tempdir().unwrap();
-        let identity = CameraIdentity {
-            protocol: 1,
-            firmware: "0.1.0".into(),
-            gateware: "0.4.0".into(),
-            board: "virtual".into(),
-            serial: "1".into(),
-            adc_hz: 125_000_000,
-            adc_bits: 14,
-            wavelength_nm: 1550,
-            capabilities: Vec::new(),
-        };
+        let identity = CameraIdentity::current("virtual", "1");
         let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
         let create = |name: &str| {
             let target = Target::New(folder.path().join(name));

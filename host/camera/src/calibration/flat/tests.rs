@@ -64,17 +64,7 @@ fn an_image_of_another_size_stays_as_it_is() {
 }
 
 fn camera(serial: &str) -> CameraIdentity {
-    CameraIdentity {
-        protocol: 1,
-        firmware: "0.1.0".into(),
-        gateware: "0.1.0".into(),
-        board: "virtual".into(),
-        serial: serial.into(),
-        adc_hz: 125_000_000,
-        adc_bits: 14,
-        wavelength_nm: 1550,
-        capabilities: Vec::new(),
-    }
+    CameraIdentity::current("virtual", serial)
 }
 
 fn kept() -> KeptFlatField {
