@@ -62,7 +62,8 @@ impl Detector {
     }
 
     /// The sample of the light of these lines.
-    #[inline]
+    // Apart from the loops of `advance`, which take what is called there alone into themselves.
+    #[inline(never)]
     fn sample(&mut self, lines: Lines) -> AdcSample {
         if self.chain.sees_switching() {
             self.switching_sample(lines)
@@ -72,14 +73,14 @@ impl Detector {
     }
 
     /// Of a camera whose light is described by its sum.
-    #[inline]
+    #[inline(always)]
     fn linear_sample(&mut self, lines: Lines) -> AdcSample {
         let light = self.array.light(lines.rows, lines.columns, lines.enable);
         word(self.chain.sample_sum(light))
     }
 
     /// Of a camera with LEDs and lines that switch one by one.
-    #[inline]
+    #[inline(always)]
     fn switching_sample(&mut self, lines: Lines) -> AdcSample {
         let new = (self.shown != Some(lines)).then(|| {
             self.shown = Some(lines);
@@ -97,7 +98,7 @@ impl Detector {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn advance_with(&mut self, clocks: u64, sample: impl Fn(&mut Self, Lines) -> AdcSample) {
         for _ in 0..clocks {
             // The ADC is not read outside a run, and drawing its noise is most of the work.
