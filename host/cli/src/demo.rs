@@ -1,12 +1,12 @@
 //! `nirspi demo`: the whole camera on a simulated scene, from light to picture.
 
 use super::camera::{LIGHT_HELP, Rain, SceneArgs, SetupArgs, exposure};
-use super::method::{MethodArgs, Solved, solve};
+use super::method::MethodArgs;
 use super::print;
 use super::progress::Progress;
 use super::provenance;
 use super::report::{ReportArgs, StageTimes, stages};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use nirspi::account::LossCounters;
 use nirspi::exposure::{Length, Light};
 use nirspi::files::image::encode_grey;
@@ -14,15 +14,12 @@ use nirspi::files::measurement::encode as encode_measurement;
 use nirspi::files::npy;
 use nirspi::files::output::OutputDir;
 use nirspi::identity::CameraIdentity;
-use nirspi::imaging::{KnownReadings, MethodReport, Quality, score, share_of_white};
+use nirspi::imaging::{MethodReport, Quality, score};
 use nirspi::picture::Pictures;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::words::{count, count_of};
-use nirspi_recon::{Image, Measurements, Sampling, reconstruct};
-use nirspi_virtual::{
-    CameraModel, Panels, SCENE_PX, Stages, StagesReport, calibrate_against_white, enhance_stages,
-    flat_field_against_white, shoot, white_level_at_target,
-};
+use nirspi_recon::{Image, Measurements, Sampling};
+use nirspi_virtual::{Bench, CameraModel, Panels, SCENE_PX, Seen, SeenImage, Stages, StagesReport};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -149,21 +146,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let setup = MeasurementSetup { sweeps: exposure.sweeps, ..setup };
     let mut times = stages();
     let (map, optics) = times.time("scene", || scene.optics())?;
-    // Latency belongs to the camera and not to the scene.
     let seed = scene.seed;
-    let model = optics.camera_model();
-    let settling = times.time("calibrate", || calibrate_against_white(&optics, seed))?;
-    let flat_field =
-        times.time("flat_field", || flat_field_against_white(&optics, &settling, seed))?;
-    let white = times.time("white_sheet", || {
-        white_level_at_target(&optics, &settling, flat_field.as_ref(), seed)
-    })?;
-
+    let bench = Bench { optics, setup, frames: exposure.frames, seed };
+    let calibrated = bench.calibrated(&mut times)?;
     let bar = Progress::of("capture", exposure.frames, "frames");
-    let shot = times.time("capture", || {
-        shoot(&optics, setup, &settling, exposure.frames, seed, &mut bar.watch())
-    })?;
+    let seen = calibrated.capture(&mut times, &mut bar.watch())?;
     drop(bar);
+    let Seen { bench: Bench { optics, .. }, shot, measurements, flat_field, white } = &seen;
+    let model = optics.camera_model();
     let camera = shot.session.identity().clone();
     let captured = &shot.capture;
     let mut notes: Vec<String> =
@@ -171,24 +161,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let setup = &captured.setup;
     let leak = captured.settling.as_ref().map(|s| s.leak(setup.clocks_per_pattern, setup.blanked));
     let leak = leak.transpose()?;
-    let measurements = shot.measurements()?;
-    // Every image is corrected for unequal LEDs, and in shares of the white sheet.
-    let seen = |image: Image| match &flat_field {
-        Some(flat) => share_of_white(&flat.correct(&image), white),
-        None => share_of_white(&image, white),
-    };
-    let raw = seen(times.time("inverse_transform", || reconstruct::hadamard(&measurements)));
-    let Solved { image, with_readings, report: method } =
-        times.time("reconstruct", || solve(&args.method, &measurements))?;
-    let (image, for_networks) = (seen(image), seen(with_readings));
-
-    let truth = optics.focused_footprint()?.weights().to_vec();
-    let (raw_quality, quality) = (score(&raw, &truth)?, score(&image, &truth)?);
+    let raw = times.time("inverse_transform", || seen.plain_transform());
     let settings = args.method.settings_for(measurements.side().pixels())?;
-    let readings = KnownReadings::new(&method, &settings, &measurements);
-    let readings = readings.map(|readings| readings.in_shares_of(white));
-    let rows = measurements.rows();
-    let stages = enhance_stages(&for_networks, rows, readings, &optics, seed, &mut times)?;
+    let image = times.time("reconstruct", || seen.reconstruct(args.method.method, &settings));
+    let image = match &args.method.dictionary {
+        Some(path) => image.with_context(|| path.display().to_string())?,
+        None => image?,
+    };
+    let truth = optics.focused_footprint()?.weights().to_vec();
+    let (raw_quality, quality) = (score(&raw, &truth)?, score(&image.image, &truth)?);
+    let stages = seen.enhance(&image, &mut times)?;
+    let SeenImage { image, report: method, .. } = image;
     if quality.inverted {
         notes.push(
             "the image is darker where the scene is brighter: it is scored as blank".to_owned(),
@@ -201,7 +184,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let panels = Panels {
         map: &map,
         in_field: &in_field,
-        optics: &optics,
+        optics,
         capture: captured,
         acquisition_ms,
         rain: &rain,
@@ -232,11 +215,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         differential: setup.differential,
         sweeps: setup.sweeps,
         acquisition_ms,
-        white_counts: white,
+        white_counts: *white,
         frames: captured.counters,
         adc_latency_clocks: setup.adc_latency,
         leak_taps: leak.map(|leak| leak.taps().to_vec()).unwrap_or_default(),
-        dead_leds: flat_field.map(|flat| flat.dead_leds().to_vec()),
+        dead_leds: flat_field.as_ref().map(|flat| flat.dead_leds().to_vec()),
         raw: raw_quality,
         reconstruction: quality,
         quality_note: "against the scene on the 32 x 32 LED grid without defocus; PSNR and SSIM after the gain and \
@@ -258,7 +241,7 @@ struct Images<'a> {
     truth: Vec<f32>,
     raw: Image,
     image: Image,
-    measurements: Measurements,
+    measurements: &'a Measurements,
     stages: &'a Stages,
 }
 
@@ -277,7 +260,7 @@ fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
     // The input of `enhance` and `reconstruct`.
     out.write("frames.npy", &npy::encode(&[1, side, side], images.image.pixels()))?;
     let measurement = args.out.join("measurement.npz");
-    let measured = encode_measurement(&measurement, &images.measurements, provenance)?;
+    let measured = encode_measurement(&measurement, images.measurements, provenance)?;
     out.write("measurement.npz", &measured)?;
     out.write("truth_64.npy", &npy::encode(&[2 * side, 2 * side], &stages.truth))?;
     for (name, image) in

@@ -2,17 +2,16 @@
 
 use super::Usage;
 use super::report::words;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, FromArgMatches};
-use nirspi::imaging::MethodReport;
 use nirspi::reconstruct::{Recipe, Solver, own_atoms, read_atoms};
 use nirspi::source::FirstPatterns;
 use nirspi_nets::Device;
 use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{
-    self, Method, MethodSettings, Reconstruct, ReconstructError, Sparsity, Strength,
+    self, Method, MethodSettings, ReconstructError, Sparsity, Strength,
 };
-use nirspi_recon::{Basis, Image, Measurements, Sampling};
+use nirspi_recon::{Basis, Sampling};
 use std::path::PathBuf;
 
 /// How to make the image.
@@ -139,33 +138,4 @@ impl MethodArgs {
         let backend = if self.backend == Backend::Auto { Backend::Cpu } else { self.backend };
         Ok(Device::open(backend)?)
     }
-
-    /// The method, ready for images of this side.
-    pub fn prepare(&self, side: usize) -> Result<Box<dyn Reconstruct>> {
-        Ok(self.method.prepare(&self.settings_for(side)?)?)
-    }
-}
-
-/// An image and its report.
-pub struct Solved {
-    /// The image, in the measurements' units.
-    pub image: Image,
-    /// The same with the readings as they are, for networks.
-    pub with_readings: Image,
-    /// The report.
-    pub report: MethodReport,
-}
-
-/// Makes the image.
-pub fn solve(args: &MethodArgs, measurements: &Measurements) -> Result<Solved> {
-    let made = args.prepare(measurements.side().pixels())?.reconstruct(measurements);
-    let made = match &args.dictionary {
-        Some(path) => made.with_context(|| path.display().to_string())?,
-        None => made?,
-    };
-    Ok(Solved {
-        with_readings: made.with_readings(measurements),
-        image: made.image,
-        report: MethodReport { method: args.method, made: made.report },
-    })
 }

@@ -17,6 +17,7 @@
 pub mod example;
 mod fpga;
 mod link;
+mod look;
 mod model;
 mod optics;
 mod panels;
@@ -29,6 +30,7 @@ pub mod weather;
 
 pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
 pub use link::MemoryLink;
+pub use look::{Bench, Calibrated, Look, LookError, Seen, SeenImage, SeenPicture};
 pub use model::{CameraFileError, read_camera_model};
 pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
