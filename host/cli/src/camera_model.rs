@@ -69,6 +69,12 @@ fn say(report: &Report) -> Result<()> {
             at.picture_snr
         ))?;
     }
+    if report.first_pixel_off.abs() >= 0.005 {
+        print::line(format_args!(
+            "LEDs: rise and fall differ, so pixel (0, 0) of a white sheet reads {:.2} of white (all patterns)",
+            1.0 + report.first_pixel_off
+        ))?;
+    }
     let eyes = report.eye_safety.map(|light| format!("{light} (more: nirspi safety)"));
     let refused = || report.eye_safety_refused.as_ref().map(|why| format!("refused: {why}"));
     eyes.or_else(refused).iter().try_for_each(|eyes| print::line(format_args!("eyes: {eyes}")))

@@ -34,6 +34,9 @@ pub struct Report {
     pub amplifier_noise_pa_per_sqrt_hz: f64,
     /// Gain-bandwidth product that the amplifier needs.
     pub gain_bandwidth_ghz: f64,
+    /// What pixel (0, 0) of a white sheet is off by in the image of all patterns, in units of white, because the LEDs rise
+    /// unlike they fall.
+    pub first_pixel_off: f64,
     /// The camera at some distances.
     pub distances: Vec<AtDistance>,
     /// The light at an eye in front of the camera; `null` for a wavelength whose limits are not implemented.
@@ -88,6 +91,11 @@ pub fn camera_model(camera: &CameraModel) -> Result<Report> {
         quantum_efficiency: camera.quantum_efficiency(),
         amplifier_noise_pa_per_sqrt_hz: camera.amplifier_noise_pa_per_sqrt_hz(),
         gain_bandwidth_ghz: camera.gain_bandwidth_ghz(),
+        first_pixel_off: {
+            let readout = camera.readout;
+            let chain = camera.chain_settings();
+            chain.first_pixel_off(readout.clocks_per_pattern.into(), readout.blanked.into())
+        },
         distances: distances.iter().map(|&m| at(camera, &dry, m)).collect::<Result<_>>()?,
         eye_safety,
         eye_safety_refused,

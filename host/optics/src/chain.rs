@@ -33,9 +33,9 @@ use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::Budget;
 use crate::edges::{LedEdges, Light, Pools, time_constant_ns};
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
+use crate::{Budget, LEDS};
 
 /// The steps of the switchable amplifier gain, in electrons per ADC count: two steps per octave.
 pub const GAINS_ELECTRONS_PER_COUNT: [f64; 32] = gains();
@@ -283,6 +283,33 @@ impl ChainSettings {
         let t = (f64::from(n) + 1.0) * self.sample_ns - delay_ns;
         let (led, amplifier) = (time_constant_ns(edge_ns), self.amplifier_tau_ns());
         1.0 - decay(t, amplifier) - shared_decay(t, led, amplifier)
+    }
+
+    /// What pixel (0, 0) of a white sheet is off by, in units of white, in the image of all patterns
+    /// with their complements: 0 if rise and fall are alike.
+    ///
+    /// All LEDs change at a complement and half of them at the next pattern. So all differences of
+    /// pattern and complement have a quarter of `rising rest - falling rest` of every LED in common,
+    /// less what of it is left one pattern later, and so on. Such a constant is one pixel. The host
+    /// knows the rise; its taps pass their sum of a constant, `1 - 2 rising rest`.
+    #[must_use]
+    pub fn first_pixel_off(&self, clocks: u32, blanked: u32) -> f64 {
+        if self.led.are_alike() {
+            return 0.0;
+        }
+        let window = blanked.min(clocks.saturating_sub(1))..clocks.max(1);
+        let samples = f64::from(window.end - window.start);
+        let mean = |slot: u32, rest: &dyn Fn(u32) -> f64| {
+            window.clone().map(|n| rest(slot * clocks + n)).sum::<f64>() / samples
+        };
+        let (mut common, mut sign) = (0.0, 1.0);
+        // LEDs settle within a slot (crate::camera), so later slots have nothing.
+        for slot in 0..8 {
+            common += sign * mean(slot, &|n| self.falling(n) - self.rising(n));
+            sign = -sign;
+        }
+        let kept = 1.0 - 2.0 * mean(0, &|n| 1.0 - self.rising(n));
+        f64::from(LEDS as u32) * common / 4.0 / kept
     }
 
     /// Whether the samples are linear in the patterns: rising and falling light are alike, and lines

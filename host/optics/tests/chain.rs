@@ -312,6 +312,23 @@ fn settling_is_the_mean_of_rise_and_fall() {
 }
 
 #[test]
+fn the_first_pixel_is_off_by_the_difference_of_rise_and_fall() {
+    let with = |led| ChainSettings { led, ..ChainSettings::default() }.first_pixel_off(5, 2);
+    assert_eq!(with(LedEdges::alike(15.0)), 0.0);
+    let circuit =
+        LedEdges { rise_ns: 12.76, fall_ns: 16.36, turn_on_delay_ns: 1.22, turn_off_delay_ns: 0.0 };
+    // boards/electronics/check.py has -3.69 with 60.5 MHz.
+    assert!((with(circuit) + 3.69).abs() < 0.03, "{}", with(circuit));
+    let reverse = LedEdges {
+        rise_ns: circuit.fall_ns,
+        fall_ns: circuit.rise_ns,
+        turn_on_delay_ns: 0.0,
+        turn_off_delay_ns: circuit.turn_on_delay_ns,
+    };
+    assert!(with(reverse) > 3.5);
+}
+
+#[test]
 fn settings_out_of_range_are_named() {
     let default = ChainSettings::default();
     let led = |led| ChainSettings { led, ..default };
