@@ -16,7 +16,8 @@ module nirspi_sequencer (
     logic          slot_first  ;
     logic [16-1:0] skip_left   ;
     logic          counts      ;
-    logic          complement  ;
+    logic          second      ;
+    logic          swapped     ;
     logic [10-1:0] index       ;
     logic [10-1:0] index_left  ;
     logic          index_last  ;
@@ -32,7 +33,7 @@ module nirspi_sequencer (
     logic          run_over    ;
 
     always_comb begin
-        pattern_over = clock_last && (complement || !settings.differential);
+        pattern_over = clock_last && (second || !settings.differential);
         sweep_over   = pattern_over && index_last;
         frame_over   = sweep_over && sweep_last;
         run_over     = frame_over && final_frame && !settings.endless;
@@ -44,7 +45,7 @@ module nirspi_sequencer (
         place.slot_last   = active && clock_last;
         place.counts      = active && counts;
         place.index       = index;
-        place.complement  = complement;
+        place.complement  = second ^ swapped;
         place.sweep_first = sweep_first;
         place.frame_first = active && frame_first;
         place.frame_last  = active && frame_over;
@@ -84,25 +85,35 @@ module nirspi_sequencer (
         end
     end
 
-    // Pattern of the sweep, and its complement.
+    // Pattern of the sweep, and its complement, which comes second, or first in every second sweep of the run.
     always_ff @ (posedge clk) begin
         if (rst) begin
-            complement <= 0;
+            second     <= 0;
             index      <= 0;
             index_left <= 0;
             index_last <= 0;
         end else if (start) begin
-            complement <= 0;
+            second     <= 0;
             index      <= 0;
             index_left <= settings.patterns_less_1;
             index_last <= settings.single_pattern;
         end else if (pattern_over) begin
-            complement <= 0;
+            second     <= 0;
             index      <= ((index_last) ? ( 0 ) : ( index + 1 ));
             index_left <= ((index_last) ? ( settings.patterns_less_1 ) : ( index_left - 1 ));
             index_last <= ((index_last) ? ( settings.single_pattern ) : ( index_left == 1 ));
         end else if (clock_last) begin
-            complement <= 1;
+            second <= 1;
+        end
+    end
+
+    always_ff @ (posedge clk) begin
+        if (rst) begin
+            swapped <= 0;
+        end else if (start) begin
+            swapped <= 0;
+        end else if (sweep_over) begin
+            swapped <= settings.alternating && !swapped;
         end
     end
 

@@ -6,6 +6,7 @@ package nirspi_types;
         logic          order_table     ;
         logic          order_sequency  ;
         logic          differential    ;
+        logic          alternating     ; /// Every second sweep shows complements first
         logic          test_source     ;
         logic          packets         ; /// Frames are sent as packets
         logic          narrow          ; /// Samples of a packet have 24 bits

@@ -14,7 +14,10 @@ use crate::settings::Settings;
 pub(crate) struct Sequencer {
     /// Clock of the slot.
     clock: u16,
-    complement: bool,
+    /// Whether the slot is the second one of its pattern.
+    second: bool,
+    /// Whether the sweep shows complements first.
+    swapped: bool,
     index: u16,
     sweep: u32,
     frame: u32,
@@ -38,7 +41,7 @@ impl Sequencer {
 
     /// Whether the slot shows a complement.
     pub(crate) fn complement(&self) -> bool {
-        self.complement
+        self.second != self.swapped
     }
 
     /// Place of the slot's pattern in the order.
@@ -59,16 +62,17 @@ impl Sequencer {
             return Ended::Clock;
         }
         self.clock = 0;
-        if settings.differential && !self.complement {
-            self.complement = true;
+        if settings.differential && !self.second {
+            self.second = true;
             return Ended::Slot;
         }
-        self.complement = false;
+        self.second = false;
         self.index += 1;
         if self.index < settings.patterns {
             return Ended::Slot;
         }
         self.index = 0;
+        self.swapped = settings.alternating && !self.swapped;
         self.sweep += 1;
         if self.sweep < settings.sweeps {
             return Ended::Slot;

@@ -19,6 +19,8 @@ use std::ops::RangeInclusive;
 pub(crate) struct Settings {
     pub(crate) order: Order,
     pub(crate) differential: bool,
+    /// Every second sweep shows complements first. Only with `differential`.
+    pub(crate) alternating: bool,
     pub(crate) test_source: bool,
     /// Frames are sent as packets.
     pub(crate) packets: bool,
@@ -66,6 +68,7 @@ impl Settings {
                 Order::Natural
             },
             differential: bits & mode::DIFFERENTIAL != 0,
+            alternating: bits & mode::ALTERNATING != 0 && bits & mode::DIFFERENTIAL != 0,
             test_source: bits & mode::TEST_SOURCE != 0,
             packets: bits & mode::PACKETS != 0,
             width: if bits & mode::NARROW == 0 { Width::Bits32 } else { Width::Bits24 },

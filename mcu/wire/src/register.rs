@@ -337,9 +337,18 @@ pub mod mode {
     pub const NARROW: u32 = 1 << 5;
     /// Packets leave by the parallel port. A start with this bit and without `PACKETS` is refused.
     pub const PARALLEL: u32 = 1 << 6;
+    /// Every second sweep of a run, from its second on, shows each complement before its pattern. The sums stay those of
+    /// pattern and complement. Without `DIFFERENTIAL` the bit changes nothing.
+    pub const ALTERNATING: u32 = 1 << 7;
     /// Every bit that has a meaning; a start with any other is refused.
-    pub const DEFINED: u32 =
-        DIFFERENTIAL | ORDER_SEQUENCY | ORDER_TABLE | TEST_SOURCE | PACKETS | NARROW | PARALLEL;
+    pub const DEFINED: u32 = DIFFERENTIAL
+        | ORDER_SEQUENCY
+        | ORDER_TABLE
+        | TEST_SOURCE
+        | PACKETS
+        | NARROW
+        | PARALLEL
+        | ALTERNATING;
 }
 
 /// Reason latched in [`Register::Fault`].

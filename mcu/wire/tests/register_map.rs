@@ -86,8 +86,9 @@ fn bits_codes_and_limits_are_these() {
         mode::PACKETS,
         mode::NARROW,
         mode::PARALLEL,
+        mode::ALTERNATING,
     ];
-    assert_eq!((mode, mode::DEFINED), ([1, 2, 4, 8, 16, 32, 64], 127));
+    assert_eq!((mode, mode::DEFINED), ([1, 2, 4, 8, 16, 32, 64, 128], 255));
     let flags = [
         FrameFlags::OVER_RANGE,
         FrameFlags::OVERFLOW,

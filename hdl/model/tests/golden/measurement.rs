@@ -58,7 +58,7 @@ proptest! {
         seed: u64,
     ) {
         let setup = Setup {
-            order, patterns: 1024, differential: true, test_source: false,
+            order, patterns: 1024, differential: true, alternating: false, test_source: false,
             dwell, blank, latency, sweeps, frames: 1,
         };
         let mut bench = Bench::new();
@@ -136,6 +136,7 @@ fn the_negative_half_of_an_earlier_run_does_not_show_in_a_plain_one() {
         order: Order::Natural,
         patterns: 4,
         differential: true,
+        alternating: true,
         test_source: false,
         dwell: 2,
         blank: 0,

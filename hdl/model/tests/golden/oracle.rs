@@ -22,6 +22,7 @@ pub struct Setup {
     pub order: Order,
     pub patterns: u16,
     pub differential: bool,
+    pub alternating: bool,
     pub test_source: bool,
     pub dwell: u16,
     pub blank: u16,
@@ -53,6 +54,9 @@ impl Setup {
         }
         if self.differential {
             bits |= mode::DIFFERENTIAL;
+        }
+        if self.alternating {
+            bits |= mode::ALTERNATING;
         }
         if self.test_source {
             bits |= mode::TEST_SOURCE;
@@ -97,14 +101,24 @@ impl Setup {
         u64::from(f + 1) * self.clocks_per_frame() + u64::from(self.latency)
     }
 
+    /// Whether a slot of a differential sweep shows a complement; the run's sweeps count from 0.
+    fn complement(&self, sweep: u64, slot: u64) -> bool {
+        let first = self.alternating && sweep % 2 == 1;
+        slot % 2 == u64::from(!first)
+    }
+
     /// The lines at clock `t` of the run.
     pub fn lines(&self, t: u64) -> Lines {
         if t >= self.lit_clocks() {
             return Lines::default();
         }
-        let slot = t / u64::from(self.dwell) % self.slots_per_sweep();
-        let (k, complement) =
-            if self.differential { (slot / 2, slot % 2 == 1) } else { (slot, false) };
+        let slots = t / u64::from(self.dwell);
+        let (sweep, slot) = (slots / self.slots_per_sweep(), slots % self.slots_per_sweep());
+        let (k, complement) = if self.differential {
+            (slot / 2, self.complement(sweep, slot))
+        } else {
+            (slot, false)
+        };
         let pattern = u32::from(self.pattern(k as u16));
         let sign_lines = |half: u32, inverted: bool| {
             (0..32).map(|i| (((half & i).count_ones() % 2) ^ u32::from(inverted)) << i).sum()
@@ -140,10 +154,10 @@ impl Setup {
                     }
                     if !self.differential {
                         sums[slot as usize].positive += u64::from(sample.code);
-                    } else if slot % 2 == 0 {
-                        sums[slot as usize / 2].positive += u64::from(sample.code);
-                    } else {
+                    } else if self.complement(u64::from(f) * u64::from(self.sweeps) + sweep, slot) {
                         sums[slot as usize / 2].negative += u64::from(sample.code);
+                    } else {
+                        sums[slot as usize / 2].positive += u64::from(sample.code);
                     }
                 }
             }
@@ -187,12 +201,14 @@ pub fn setup() -> impl Strategy<Value = Setup> {
         9 => (1u16..24, 1u16..10, 1u32..4, 1u32..4),
         1 => (1020u16..=1024, 1u16..3, Just(1u32), 1u32..3),
     ];
-    (order(), size, any::<bool>(), prop::bool::weighted(0.1), any::<u16>(), 0u8..64).prop_map(
-        |(order, (patterns, dwell, sweeps, frames), differential, test_source, blank, latency)| {
+    (order(), size, any::<[bool; 2]>(), prop::bool::weighted(0.1), any::<u16>(), 0u8..64).prop_map(
+        |(order, (patterns, dwell, sweeps, frames), pairs, test_source, blank, latency)| {
+            let [differential, alternating] = pairs;
             Setup {
                 order,
                 patterns,
                 differential,
+                alternating,
                 test_source,
                 dwell,
                 blank: blank % dwell,

@@ -16,6 +16,7 @@ fn small() -> Setup {
         order: Order::Sequency,
         patterns: 3,
         differential: true,
+        alternating: true,
         test_source: false,
         dwell: 2,
         blank: 1,

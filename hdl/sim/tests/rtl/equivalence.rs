@@ -306,7 +306,10 @@ fn a_whole_differential_sweep_agrees() {
     rig.wait_adc(100);
     rig.set(Register::Frames, 1);
     for (bits, packets) in [(0, 0), (mode::PACKETS, 1), (mode::PACKETS | mode::NARROW, 1)] {
-        rig.set(Register::Mode, mode::DIFFERENTIAL | mode::ORDER_SEQUENCY | bits);
+        rig.set(
+            Register::Mode,
+            mode::DIFFERENTIAL | mode::ALTERNATING | mode::ORDER_SEQUENCY | bits,
+        );
         rig.seen_so_far = Tally::default();
         let started = std::time::Instant::now();
         rig.set(Register::Control, control::START);

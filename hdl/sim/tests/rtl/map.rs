@@ -77,6 +77,7 @@ pub fn package() -> String {
         ("MODE_PACKETS", mode::PACKETS),
         ("MODE_NARROW", mode::NARROW),
         ("MODE_PARALLEL", mode::PARALLEL),
+        ("MODE_ALTERNATING", mode::ALTERNATING),
         ("MODE_DEFINED", mode::DEFINED),
         ("FAULT_WATCHDOG", FaultCode::Watchdog as u32),
         ("FAULT_DUTY", FaultCode::Duty as u32),

@@ -66,6 +66,7 @@ fn set_up(rig: &mut Rig, dice: &mut Dice, more: u32) -> u64 {
     let sweeps = dice.range(1, (FRAME_CLOCKS / (patterns * dwell)).clamp(1, 5));
     let differential = dice.once_in(2);
     let mut bits = more | if differential { mode::DIFFERENTIAL } else { 0 };
+    bits |= if dice.once_in(2) { mode::ALTERNATING } else { 0 };
     bits |= match dice.range(0, 3) {
         0 => 0,
         1 => mode::ORDER_SEQUENCY,

@@ -13,6 +13,7 @@ pub struct Settings {
     pub order_table: bool,
     pub order_sequency: bool,
     pub differential: bool,
+    pub alternating: bool,
     pub test_source: bool,
     pub packets: bool,
     pub narrow: bool,
@@ -38,6 +39,7 @@ impl Default for Settings {
             order_table: false,
             order_sequency: false,
             differential: false,
+            alternating: false,
             test_source: false,
             packets: false,
             narrow: false,
@@ -56,8 +58,8 @@ impl Default for Settings {
 }
 
 /// Bits of the fields of `types::Settings`.
-pub const SETTINGS: [usize; 26] =
-    [1, 1, 1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
+pub const SETTINGS: [usize; 27] =
+    [1, 1, 1, 1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
 /// Bits of the fields of `types::Stamp`.
 pub const STAMP: [usize; 3] = [16, 64, 64];
 /// Bits of the fields of `types::Place`.
@@ -69,8 +71,10 @@ impl Settings {
     /// Random settings of a run of some hundred clocks at most.
     pub fn random(dice: &mut Dice) -> Self {
         let dwell = if dice.once_in(3) { 1 } else { dice.range(1, 7) };
+        let differential = dice.once_in(2);
         Self {
-            differential: dice.once_in(2),
+            differential,
+            alternating: differential && dice.once_in(2),
             patterns: dice.range(1, 6),
             dwell,
             blank: if dice.once_in(3) { 0 } else { dice.range(0, dwell - 1) },
@@ -88,6 +92,7 @@ impl Settings {
             self.order_table.into(),
             self.order_sequency.into(),
             self.differential.into(),
+            self.alternating.into(),
             self.test_source.into(),
             self.packets.into(),
             self.narrow.into(),
@@ -148,13 +153,15 @@ impl Place {
         }
         let (slot, of_slot) = (clock / settings.dwell, clock % settings.dwell);
         let pattern = slot / settings.halves();
+        let is_swapped = settings.alternating
+            && (frame * settings.sweeps + pattern / settings.patterns) % 2 == 1;
         let frame_last = clock == settings.frame_clocks() - 1;
         Some(Self {
             slot_first: of_slot == 0,
             slot_last: of_slot == settings.dwell - 1,
             counts: of_slot >= settings.blank,
             index: pattern % settings.patterns,
-            complement: slot % settings.halves() == 1,
+            complement: settings.differential && (slot % 2 == 1) != is_swapped,
             sweep_first: pattern / settings.patterns == 0,
             frame_first: clock == 0,
             frame_last,

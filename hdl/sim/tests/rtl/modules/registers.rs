@@ -69,11 +69,15 @@ fn a_register_reads_what_was_written_to_it_and_to_no_other(project: &Project) {
 fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
     let dwell = dice.pick(&[1, 2, 5, 300, 65_535]);
     let flag = |dice: &mut Dice| dice.once_in(2);
+    let differential = flag(dice);
+    // Without complements the bit changes nothing.
+    let alternates = flag(dice);
     let settings = Settings {
         raw: false,
         order_table: flag(dice),
         order_sequency: flag(dice),
-        differential: flag(dice),
+        differential,
+        alternating: differential && alternates,
         test_source: flag(dice),
         packets: flag(dice),
         narrow: flag(dice),
@@ -90,6 +94,7 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
     };
     let modes = [
         (settings.differential, mode::DIFFERENTIAL),
+        (alternates, mode::ALTERNATING),
         (settings.order_sequency, mode::ORDER_SEQUENCY),
         (settings.order_table, mode::ORDER_TABLE),
         (settings.test_source, mode::TEST_SOURCE),
