@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         camera: &camera,
         passed: found.passed(),
         checks: &found.checks,
-        measured: kept.as_ref().map(|(kept, _)| kept.measured().to_owned()),
+        measured: kept.as_ref().map(|(kept, _)| kept.measured()),
         calibration: kept.map(|(_, path)| path),
     };
     args.report.print(&report, &provenance::of_camera(&camera), say)?;

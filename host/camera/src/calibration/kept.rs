@@ -63,10 +63,11 @@ impl KeptCalibration {
         Self { kind, version, measured_unix_s, measured, camera, settling, checks }
     }
 
-    /// Time of measurement, as `2026-11-20 08:30 UTC`.
+    /// Time of measurement, as `2026-11-20 08:30 UTC`. The file's own words for it are for people who
+    /// open the file: here they could be anything.
     #[must_use]
-    pub fn measured(&self) -> &str {
-        &self.measured
+    pub fn measured(&self) -> String {
+        date(self.measured_unix_s)
     }
 
     /// Keeps the calibration in a file, whole or not at all: in the camera's own, or in the `named` one.

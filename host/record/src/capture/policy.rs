@@ -137,7 +137,7 @@ impl Choice {
     }
 
     fn of(kept: KeptCalibration, file: PathBuf, measure_first: bool) -> Self {
-        let origin = Some(Origin { measured: kept.measured().to_owned(), file });
+        let origin = Some(Origin { measured: kept.measured(), file });
         let calibration = if measure_first {
             Calibration::MeasureOr(kept.settling)
         } else {

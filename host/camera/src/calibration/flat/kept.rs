@@ -84,7 +84,7 @@ impl KeptFlatField {
         let percent = |share: f64| 100.0 * share;
         let mut text = format!(
             "flat field of {}: pattern {:.2} % of white, {:.2} % once corrected",
-            self.measured,
+            date(self.measured_unix_s),
             percent(self.pattern_before),
             percent(self.pattern_after)
         );

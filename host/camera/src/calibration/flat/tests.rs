@@ -87,6 +87,12 @@ fn a_flat_field_comes_back_as_it_was_and_names_dead_leds() {
     // New firmware or gateware changes neither LEDs nor lens.
     let newer = CameraIdentity { gateware: "9.9.9".into(), ..camera("A 1") };
     KeptFlatField::read(&path, &newer).unwrap();
+    // The date comes from the seconds, whatever the file's words for it are.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let words = text.replacen("\"measured\":\"20", "\"measured\":\"\\u001b[2J", 1);
+    assert_ne!(words, text);
+    std::fs::write(&path, words).unwrap();
+    assert_eq!(KeptFlatField::read(&path, &camera("A 1")).unwrap().summary(), summary);
 }
 
 #[test]
