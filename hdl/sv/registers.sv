@@ -121,12 +121,11 @@ module nirspi_registers
     nirspi_types::Settings next;
 
     always_ff @ (posedge clk) begin
-        next.raw            <= 0;
-        next.order_table    <= (mode & MODE_ORDER_TABLE) != 0;
-        next.order_sequency <= (mode & MODE_ORDER_SEQUENCY) != 0;
-        next.differential   <= (mode & MODE_DIFFERENTIAL) != 0;
-        next.alternating    <= (mode & (MODE_ALTERNATING | MODE_DIFFERENTIAL))
-            == (MODE_ALTERNATING | MODE_DIFFERENTIAL);
+        next.raw              <= 0;
+        next.order_table      <= (mode & MODE_ORDER_TABLE) != 0;
+        next.order_sequency   <= (mode & MODE_ORDER_SEQUENCY) != 0;
+        next.differential     <= (mode & MODE_DIFFERENTIAL) != 0;
+        next.alternating      <= (mode & MODE_ALTERNATING) != 0 && (mode & MODE_DIFFERENTIAL) != 0;
         next.test_source      <= (mode & MODE_TEST_SOURCE) != 0;
         next.packets          <= (mode & MODE_PACKETS) != 0;
         next.narrow           <= (mode & MODE_NARROW) != 0;

@@ -155,7 +155,9 @@ fn duty_windows_begin_at_multiples_of_their_length_since_reset() {
 
 #[test]
 fn whole_sweeps_and_complementary_pairs_never_trip_the_duty_limit() {
-    for (patterns, bits) in [(1024, 0), (1024, mode::DIFFERENTIAL), (1, mode::DIFFERENTIAL)] {
+    let alternating = mode::DIFFERENTIAL | mode::ALTERNATING;
+    let pairs = [mode::DIFFERENTIAL, alternating].map(|bits| [(1024, bits), (1, bits)]);
+    for (patterns, bits) in [(1024, 0)].into_iter().chain(pairs.into_iter().flatten()) {
         let mut bench = Bench::new();
         bench.set(Register::Watchdog, WATCHDOG_MAX);
         bench.set(Register::Patterns, patterns);

@@ -35,7 +35,7 @@ const FAULTS: &[Fault] = &[
     ("every sweep but the first shows complements first", "sequencer", "swapped = settings.alternating && !swapped;", "swapped = settings.alternating;"),
     ("frames alternate, not sweeps", "sequencer", "} else if sweep_over {\n            swapped", "} else if frame_over {\n            swapped"),
     ("a run goes on alternating where the last one stopped", "sequencer", "} else if start {\n            swapped = 0;", "} else if start {\n            swapped = swapped;"),
-    ("patterns without complements alternate too", "registers", "(mode & (MODE_ALTERNATING | MODE_DIFFERENTIAL)) == (MODE_ALTERNATING | MODE_DIFFERENTIAL)", "(mode & MODE_ALTERNATING) != 0"),
+    ("patterns without complements alternate too", "registers", "next.alternating      = (mode & MODE_ALTERNATING) != 0 && (mode & MODE_DIFFERENTIAL) != 0;", "next.alternating      = (mode & MODE_ALTERNATING) != 0;"),
     ("rows and columns are swapped", "leds", "sign_lines(pattern[4:0]);", "sign_lines(pattern[9:5]);"),
     ("sequency order is not Gray", "leds", "gray = index_2 ^ (index_2 >> 1);", "gray = index_2;"),
     ("sequency wins over the table", "leds", "if settings.order_table {", "if settings.order_table && !settings.order_sequency {"),
