@@ -8,7 +8,7 @@
 //!
 //! where the deficit is what rising LEDs still lack, and the tail is what falling LEDs still give. LEDs that are switched
 //! on add their light to the deficit, LEDs that are switched off add theirs to the tail, and each of the two pools decays
-//! with its own time constant. The delay of a switch ends within its clock ([`LedEdges::validate`]), and light is constant
+//! with its own time constant. The delay of a switch ends within its clock (`LedEdges::validate`), and light is constant
 //! otherwise, so pools and amplifier are stepped exactly.
 //!
 //! # Accuracy

@@ -30,6 +30,9 @@ use thiserror::Error;
 const PIXELS: usize = Side::INSTRUMENT.area();
 /// An LED with less than this share of the median light counts as dead.
 const DEAD_BELOW: f32 = 0.2;
+/// Pixel (0, 0) reads what all patterns have in common. Outside of this range, in units of white, it says so and nothing of
+/// its LED: a dead LED reads 0.
+const OF_AN_LED: std::ops::RangeInclusive<f32> = -DEAD_BELOW..=2.0;
 /// A reading in the dark below this many standard deviations of noise counts as 0.
 const SIGMA: f32 = 4.0;
 
@@ -38,8 +41,11 @@ const SIGMA: f32 = 4.0;
 #[serde(try_from = "Frames", into = "Frames")]
 pub struct FlatField {
     frames: Frames,
-    /// Light of each LED divided by the mean of the live LEDs; 0 for a dead LED.
+    /// Light of each LED divided by the mean of the live LEDs; 0 for a dead LED, and for pixel (0, 0) if it says nothing of
+    /// its LED.
     gain: Vec<f32>,
+    /// What pixel (0, 0) reads before the white sheet, in units of the mean of the live LEDs.
+    first_pixel: f32,
 }
 
 /// The measured frames as kept in the file. Images are row-major, 32 x 32, in ADC counts.
@@ -112,14 +118,19 @@ impl TryFrom<Frames> for FlatField {
             return Err(FramesError::NotFilled { live: shining.len() });
         }
         let mean = shining.iter().sum::<f32>() / shining.len() as f32;
-        let gain: Vec<f32> =
+        let mut gain: Vec<f32> =
             light.iter().map(|&value| if live(value) { value / mean } else { 0.0 }).collect();
+        let first_pixel = light[0] / mean;
+        let is_spoiled = !OF_AN_LED.contains(&first_pixel);
+        if is_spoiled {
+            gain[0] = 0.0;
+        }
         let side = Side::INSTRUMENT.pixels();
         let dead_leds = (0..PIXELS)
-            .filter(|&at| gain[at] == 0.0)
+            .filter(|&at| gain[at] == 0.0 && !(is_spoiled && at == 0))
             .map(|at| [(at / side) as u8, (at % side) as u8])
             .collect();
-        Ok(Self { frames: Frames { dead_leds, ..frames }, gain })
+        Ok(Self { frames: Frames { dead_leds, ..frames }, gain, first_pixel })
     }
 }
 
@@ -171,7 +182,21 @@ impl FlatField {
         Frames { dark_counts, ..self.frames }.try_into()
     }
 
-    /// Light of each LED divided by the mean of the live LEDs, row-major; 0 for a dead LED.
+    /// What pixel (0, 0) reads before the white sheet; its neighbours read about 1. What is the same in all pairs of a
+    /// pattern and its complement falls on this one pixel: LEDs that rise unlike they fall, a supply that sags, charge from
+    /// the lines that switch.
+    #[must_use]
+    pub fn first_pixel(&self) -> f32 {
+        self.first_pixel
+    }
+
+    /// Whether pixel (0, 0) says nothing of its LED. Its neighbours then take its place, as that of a dead LED.
+    #[must_use]
+    pub fn is_first_pixel_spoiled(&self) -> bool {
+        !OF_AN_LED.contains(&self.first_pixel)
+    }
+
+    /// Light of each LED divided by the mean of the live LEDs, row-major; 0 where an image takes the mean of the neighbours.
     #[must_use]
     pub fn gain(&self) -> &[f32] {
         &self.gain
@@ -215,9 +240,9 @@ impl FlatField {
             .enumerate()
             .map(|(at, (value, gain))| if *gain > 0.0 { (value - dark(at)) / gain } else { 0.0 })
             .collect();
-        for &[row, column] in self.dead_leds() {
-            let (row, column) = (usize::from(row), usize::from(column));
-            pixels[row * image.side().pixels() + column] = self.around(&pixels, row, column);
+        let side = image.side().pixels();
+        for at in (0..PIXELS).filter(|&at| self.gain[at] == 0.0) {
+            pixels[at] = self.around(&pixels, at / side, at % side);
         }
         Image::new(image.side(), pixels)
     }
