@@ -451,6 +451,16 @@ mod tests {
         for row in rows {
             let psnr = &row["psnr_db"];
             assert!(psnr["low"].as_f64() <= psnr["high"].as_f64(), "{row}");
+            // No image is below a blank one after the fit; 4 sweeps at 1 m show nothing, an ordinary camera everything.
+            let over =
+                psnr["value"].as_f64().unwrap() - row["blank_psnr_db"]["value"].as_f64().unwrap();
+            assert!(over > -0.1, "{row}");
+            let shows_nothing = row["no_measurable_image"].as_bool().unwrap();
+            match (row["image"].as_str().unwrap(), row["distance_m"].as_f64()) {
+                ("VIS", _) => assert!(!shows_nothing, "{row}"),
+                ("NIR-SPI", Some(1.0)) => assert!(shows_nothing, "{row}"),
+                _ => assert_eq!(shows_nothing, over < 0.5, "{row}"),
+            }
         }
         // "all" is the mean of the three distances.
         for kind in rows.chunks_exact(4) {

@@ -56,7 +56,7 @@ fn say(report: &Report) -> Result<()> {
     )?;
     for row in &report.rows {
         print::line(format_args!(
-            "{:<20} {:<8}  {:<24}  {:<24}  {:5.2} dB, {:.3}  {:5.2} dB  {:<22}  {} dB, {}{}",
+            "{:<20} {:<8}  {:<24}  {:<24}  {:5.2} dB, {:.3}  {:5.2} dB  {:<22}  {} dB, {}{}{}",
             row.image.name(),
             at(row.distance_m),
             row.psnr_db.text(2),
@@ -67,7 +67,8 @@ fn say(report: &Report) -> Result<()> {
             row.frechet_character_distance.text(1),
             row.paper_psnr_db,
             row.paper_ssim,
-            fid(row)
+            fid(row),
+            if row.no_measurable_image { "; no measurable image" } else { "" }
         ))?;
     }
     print::line("differences on the same scenes: PSNR dB, SSIM")?;

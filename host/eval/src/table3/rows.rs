@@ -36,6 +36,8 @@ pub struct Row {
     pub dry_ssim: Interval,
     /// PSNR of an empty picture: the lowest value of a camera.
     pub blank_psnr_db: Interval,
+    /// Whether the image scores as a blank picture does, within [`LEAST_OVER_BLANK_DB`].
+    pub no_measurable_image: bool,
     /// Fréchet distance at 64 x 64 on the features of nirspi's classifier, which is not FID. The
     /// distance grows with fewer scenes.
     pub frechet_character_distance: Interval,
@@ -61,6 +63,10 @@ pub struct Difference {
     /// Mean of the scenes' differences of SSIM.
     pub ssim: Interval,
 }
+
+/// An image that scores less than this over a blank picture shows nothing of the scene. After the fit of gain and offset no
+/// image scores below a blank one: the difference is `-10 lg(1 - r^2)`, and half a decibel is a correlation of a third.
+const LEAST_OVER_BLANK_DB: f64 = 0.5;
 
 /// The name of the subtracted kind, if it is the same kind without rain.
 const WITHOUT_RAIN: &str = "without rain";
@@ -148,14 +154,17 @@ impl Statistics<'_> {
         let draws = self.redraws.first(DISTANCE_DRAWS);
         let draws: Vec<&Vec<usize>> = draws.iter().filter(|draw| places(draw).len() > 1).collect();
         let drawn = draws.par_iter().map(|draw| of(draw)).collect::<Result<Vec<f64>>>()?;
+        let psnr_db = self.mean(distance, |k| wet[k].quality.psnr_db);
+        let blank_psnr_db = self.mean(distance, |k| self.taken[k].blank.psnr_db);
         Ok(Row {
             image: *image,
             distance_m: distance.map(|at| DISTANCES_M[at]),
-            psnr_db: self.mean(distance, |k| wet[k].quality.psnr_db),
+            no_measurable_image: psnr_db.value < blank_psnr_db.value + LEAST_OVER_BLANK_DB,
+            psnr_db,
             ssim: self.mean(distance, |k| wet[k].quality.ssim),
             dry_psnr_db: self.mean(distance, |k| dry[k].quality.psnr_db),
             dry_ssim: self.mean(distance, |k| dry[k].quality.ssim),
-            blank_psnr_db: self.mean(distance, |k| self.taken[k].blank.psnr_db),
+            blank_psnr_db,
             frechet_character_distance: Redraws::around(of(&scenes)?, drawn),
             paper_psnr_db: paper.psnr_db,
             paper_ssim: paper.ssim,
