@@ -35,6 +35,7 @@ use thiserror::Error;
 
 use crate::edges::{LedEdges, Light, Pools, time_constant_ns};
 use crate::instrument::{FULL_SCALE_COUNTS, MAX_ADC_LATENCY_CLOCKS};
+use crate::poles::{decay, shared_decay};
 use crate::{Budget, LEDS};
 
 /// The steps of the switchable amplifier gain, in electrons per ADC count: two steps per octave.
@@ -344,7 +345,16 @@ impl ChainSettings {
         for (name, value) in not_negative {
             ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
         }
-        self.led.validate(self.sample_ns)?;
+        let LedEdges { rise_ns, fall_ns, turn_on_delay_ns, turn_off_delay_ns } = self.led;
+        for (name, value) in [("rise_ns", rise_ns), ("fall_ns", fall_ns)] {
+            ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
+        }
+        for (name, value) in
+            [("turn_on_delay_ns", turn_on_delay_ns), ("turn_off_delay_ns", turn_off_delay_ns)]
+        {
+            let within = (0.0..=self.sample_ns).contains(&value);
+            ensure(within, name, value, "0 to one ADC clock")?;
+        }
         let line = self.line_electrons;
         ensure(line.is_finite(), "line_electrons", line, "a finite number")?;
         let offset = self.adc_offset_counts;
@@ -358,31 +368,13 @@ impl ChainSettings {
     }
 }
 
-pub(crate) fn ensure(
+fn ensure(
     holds: bool,
     name: &'static str,
     value: f64,
     expected: &'static str,
 ) -> Result<(), ChainError> {
     if holds { Ok(()) } else { Err(ChainError::Setting { name, value, expected }) }
-}
-
-/// exp(-t / tau). A pole with a time constant of 0 keeps nothing.
-pub(crate) fn decay(t: f64, tau: f64) -> f64 {
-    if tau > 0.0 { (-t / tau).exp() } else { 0.0 }
-}
-
-/// The rest in a pole `second` at time `t`, of a unit that was in the preceding pole `first` at
-/// time 0: `first / (first - second) * (exp(-t / first) - exp(-t / second))`.
-pub(crate) fn shared_decay(t: f64, first: f64, second: f64) -> f64 {
-    let difference = first - second;
-    if first == 0.0 {
-        0.0
-    } else if difference.abs() < 1e-6 * first {
-        t / first * decay(t, first)
-    } else {
-        first / difference * (decay(t, first) - decay(t, second))
-    }
 }
 
 /// Light that counts: a number of 0 or more.

@@ -8,7 +8,7 @@
 //!
 //! where the deficit is what rising LEDs still lack, and the tail is what falling LEDs still give. LEDs that are switched
 //! on add their light to the deficit, LEDs that are switched off add theirs to the tail, and each of the two pools decays
-//! with its own time constant. The delay of a switch ends within its clock (`LedEdges::validate`), and light is constant
+//! with its own time constant. The delay of a switch ends within its clock ([`ChainSettings`](crate::ChainSettings)), and light is constant
 //! otherwise, so pools and amplifier are stepped exactly.
 //!
 //! # Accuracy
@@ -19,7 +19,7 @@
 //! (`the_pools_agree_with_1024_leds_of_their_own` in
 //! `host/optics/tests/edges.rs`).
 
-use crate::chain::{ChainError, decay, ensure, shared_decay};
+use crate::poles::{decay, shared_decay};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -51,20 +51,6 @@ impl LedEdges {
 
     pub(crate) fn has_delay(&self) -> bool {
         self.turn_on_delay_ns != 0.0 || self.turn_off_delay_ns != 0.0
-    }
-
-    /// Checks the edges against the ADC's clock period.
-    pub(crate) fn validate(&self, sample_ns: f64) -> Result<(), ChainError> {
-        for (name, value) in [("rise_ns", self.rise_ns), ("fall_ns", self.fall_ns)] {
-            ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
-        }
-        for (name, value) in [
-            ("turn_on_delay_ns", self.turn_on_delay_ns),
-            ("turn_off_delay_ns", self.turn_off_delay_ns),
-        ] {
-            ensure((0.0..=sample_ns).contains(&value), name, value, "0 to one ADC clock")?;
-        }
-        Ok(())
     }
 }
 

@@ -44,6 +44,7 @@ pub mod instrument;
 pub mod lamp;
 pub mod mie;
 pub mod pixel;
+mod poles;
 pub mod projector;
 pub mod rain;
 pub mod range;
