@@ -36,7 +36,7 @@ pub struct Row {
     pub dry_ssim: Interval,
     /// PSNR of an empty picture: the lowest value of a camera.
     pub blank_psnr_db: Interval,
-    /// Whether the image scores as a blank picture does, within [`LEAST_OVER_BLANK_DB`].
+    /// Whether the image scores as a blank picture does, within half a decibel.
     pub no_measurable_image: bool,
     /// Fréchet distance at 64 x 64 on the features of nirspi's classifier, which is not FID. The
     /// distance grows with fewer scenes.
