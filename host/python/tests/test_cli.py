@@ -59,7 +59,9 @@ def test_the_parts_of_a_split_capture_are_the_frames_of_one(cli, tmp_path):
     parts = [ns.Recording(file) for file in files]
     assert len(parts) > 1 and all(len(part) for part in parts)
     for field in ("y", "sequence", "device_time_us"):
-        assert (np.concatenate([getattr(part, field) for part in parts]) == getattr(whole, field)).all(), field
+        assert (np.concatenate([getattr(part, field) for part in parts]) == getattr(whole, field)).all(), (
+            field
+        )
     # A program that reads exported files gets the same frames of each part.
     exported = []
     for file in [tmp_path / "whole.mcap", *files]:
