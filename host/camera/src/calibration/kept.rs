@@ -63,8 +63,8 @@ impl KeptCalibration {
         Self { kind, version, measured_unix_s, measured, camera, settling, checks }
     }
 
-    /// Time of measurement, as `2026-11-20 08:30 UTC`. The file's own words for it are for people who
-    /// open the file: here they could be anything.
+    /// Time of measurement, as `2026-11-20 08:30 UTC`: from the seconds in the file, because its words
+    /// for the time could hold anything.
     #[must_use]
     pub fn measured(&self) -> String {
         date(self.measured_unix_s)

@@ -30,8 +30,8 @@ use thiserror::Error;
 const PIXELS: usize = Side::INSTRUMENT.area();
 /// An LED with less than this share of the median light counts as dead.
 const DEAD_BELOW: f32 = 0.2;
-/// Pixel (0, 0) reads what all patterns have in common. Outside of this range, in units of white, it says so and nothing of
-/// its LED: a dead LED reads 0.
+/// What all patterns have in common falls on pixel (0, 0). A reading of this pixel outside of the range, in units of white, is
+/// not the light of its LED: a dead LED reads 0.
 const OF_AN_LED: std::ops::RangeInclusive<f32> = -DEAD_BELOW..=2.0;
 /// A reading in the dark below this many standard deviations of noise counts as 0.
 const SIGMA: f32 = 4.0;
