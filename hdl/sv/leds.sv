@@ -44,7 +44,9 @@ module nirspi_leds (
 
     // Stages 1 and 2: the table is read. Stage 3: the pattern. Stage 4: its lines.
     logic [4-1:0]  active      ;
-    logic [4-1:0]  inverted    ;
+    logic [4-1:0]  complement  ;
+    logic [3-1:0]  inverts_rows;
+    logic [3-1:0]  inverts     ;
     logic [10-1:0] index_1     ;
     logic [10-1:0] index_2     ;
     logic [10-1:0] gray        ;
@@ -72,9 +74,11 @@ module nirspi_leds (
     end
 
     always_ff @ (posedge clk) begin
-        inverted <= {inverted[2:0], place.complement};
-        index_1  <= place.index;
-        index_2  <= index_1;
+        complement   <= {complement[2:0], place.complement};
+        inverts_rows <= {inverts_rows[1:0], place.complement ^ place.inverted};
+        inverts      <= {inverts[1:0], place.inverted};
+        index_1      <= place.index;
+        index_2      <= index_1;
         if (settings.order_table) begin
             pattern <= table_entry;
         end else if (settings.order_sequency) begin
@@ -82,8 +86,8 @@ module nirspi_leds (
         end else begin
             pattern <= index_2;
         end
-        next_rows    <= sign_lines(pattern[9:5]) ^ {32{inverted[2]}};
-        next_columns <= sign_lines(pattern[4:0]);
+        next_rows    <= sign_lines(pattern[9:5]) ^ {32{inverts_rows[2]}};
+        next_columns <= sign_lines(pattern[4:0]) ^ {32{inverts[2]}};
         zero         <= pattern == 0;
     end
 
@@ -104,8 +108,8 @@ module nirspi_leds (
             columns <= ((shown) ? ( next_columns ) : ( 0 ));
             enable  <= shown && permit;
             lit     <= active[3];
-            full    <= active[3] && zero && !inverted[3];
-            dark    <= active[3] && zero && inverted[3];
+            full    <= active[3] && zero && !complement[3];
+            dark    <= active[3] && zero && complement[3];
         end
     end
 endmodule

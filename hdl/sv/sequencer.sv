@@ -18,6 +18,7 @@ module nirspi_sequencer (
     logic          counts      ;
     logic          second      ;
     logic          swapped     ;
+    logic          inverted    ;
     logic [10-1:0] index       ;
     logic [10-1:0] index_left  ;
     logic          index_last  ;
@@ -46,6 +47,7 @@ module nirspi_sequencer (
         place.counts      = active && counts;
         place.index       = index;
         place.complement  = second ^ swapped;
+        place.inverted    = inverted;
         place.sweep_first = sweep_first;
         place.frame_first = active && frame_first;
         place.frame_last  = active && frame_over;
@@ -107,13 +109,17 @@ module nirspi_sequencer (
         end
     end
 
+    // Every second pair of sweeps inverts all lines.
     always_ff @ (posedge clk) begin
         if (rst) begin
-            swapped <= 0;
+            swapped  <= 0;
+            inverted <= 0;
         end else if (start) begin
-            swapped <= 0;
+            swapped  <= 0;
+            inverted <= 0;
         end else if (sweep_over) begin
-            swapped <= settings.alternating && !swapped;
+            swapped  <= settings.alternating && !swapped;
+            inverted <= inverted ^ swapped;
         end
     end
 

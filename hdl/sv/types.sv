@@ -6,7 +6,7 @@ package nirspi_types;
         logic          order_table     ;
         logic          order_sequency  ;
         logic          differential    ;
-        logic          alternating     ; /// Every second sweep shows complements first
+        logic          alternating     ; /// Sweeps differ in which comes first, and in the sign of all lines
         logic          test_source     ;
         logic          packets         ; /// Frames are sent as packets
         logic          narrow          ; /// Samples of a packet have 24 bits
@@ -38,7 +38,7 @@ package nirspi_types;
         logic [64-1:0] time_base ; /// Device time of that clock in microseconds
     } Stamp;
 
-    /// Where a clock lies in a run. Outside, `index`, `complement` and `sweep_first` mean nothing; the rest is 0.
+    /// Where a clock lies in a run. Outside, `index`, `complement`, `inverted` and `sweep_first` mean nothing; the rest is 0.
     typedef struct packed {
         logic          active     ;
         logic          slot_first ;
@@ -46,6 +46,7 @@ package nirspi_types;
         logic          counts     ; /// Not blanked
         logic [10-1:0] index      ;
         logic          complement ;
+        logic          inverted   ; /// All lines are, which lights the same LEDs
         logic          sweep_first; /// In the first sweep of the frame
         logic          frame_first;
         logic          frame_last ;

@@ -96,9 +96,16 @@ impl Leds {
         let pattern = table.pattern(settings.order, self.sequencer.index());
         let complement = self.sequencer.complement();
         let side = u16::from(SIDE);
-        let rows = WALSH[usize::from(pattern / side)];
-        let columns = WALSH[usize::from(pattern % side)];
-        self.lines = Lines { rows: if complement { !rows } else { rows }, columns, enable: true };
+        let inverted = self.sequencer.inverted();
+        let signs = |k: u16, inverts: bool| {
+            let lines = WALSH[usize::from(k)];
+            if inverts { !lines } else { lines }
+        };
+        self.lines = Lines {
+            rows: signs(pattern / side, complement != inverted),
+            columns: signs(pattern % side, inverted),
+            enable: true,
+        };
         self.half_arrays = half_arrays(pattern, complement);
     }
 }

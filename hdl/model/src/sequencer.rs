@@ -18,6 +18,8 @@ pub(crate) struct Sequencer {
     second: bool,
     /// Whether the sweep shows complements first.
     swapped: bool,
+    /// Whether the sweep inverts all lines, which lights the same LEDs.
+    inverted: bool,
     index: u16,
     sweep: u32,
     frame: u32,
@@ -42,6 +44,11 @@ impl Sequencer {
     /// Whether the slot shows a complement.
     pub(crate) fn complement(&self) -> bool {
         self.second != self.swapped
+    }
+
+    /// Whether the slot inverts all lines.
+    pub(crate) fn inverted(&self) -> bool {
+        self.inverted
     }
 
     /// Place of the slot's pattern in the order.
@@ -72,6 +79,7 @@ impl Sequencer {
             return Ended::Slot;
         }
         self.index = 0;
+        self.inverted ^= self.swapped;
         self.swapped = settings.alternating && !self.swapped;
         self.sweep += 1;
         if self.sweep < settings.sweeps {

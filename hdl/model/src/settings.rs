@@ -19,7 +19,8 @@ use std::ops::RangeInclusive;
 pub(crate) struct Settings {
     pub(crate) order: Order,
     pub(crate) differential: bool,
-    /// Every second sweep shows complements first. Only with `differential`.
+    /// Every second sweep shows complements first, every second pair of sweeps inverts all lines. Only
+    /// with `differential`.
     pub(crate) alternating: bool,
     pub(crate) test_source: bool,
     /// Frames are sent as packets.

@@ -337,8 +337,10 @@ pub mod mode {
     pub const NARROW: u32 = 1 << 5;
     /// Packets leave by the parallel port. A start with this bit and without `PACKETS` is refused.
     pub const PARALLEL: u32 = 1 << 6;
-    /// Every second sweep of a run, from its second on, shows each complement before its pattern. The sums stay those of
-    /// pattern and complement. Without `DIFFERENTIAL` the bit changes nothing.
+    /// Sweeps differ, with a period of four that begins with the run. Every second one, from the second on, shows each
+    /// complement before its pattern. The third and the fourth invert all lines, which lights the same LEDs. The sums
+    /// stay those of pattern and complement. What comes of the place in a pair, or of the lines' own charge, changes its
+    /// sign and cancels in four sweeps. Without `DIFFERENTIAL` the bit changes nothing.
     pub const ALTERNATING: u32 = 1 << 7;
     /// Every bit that has a meaning; a start with any other is refused.
     pub const DEFINED: u32 = DIFFERENTIAL

@@ -114,18 +114,19 @@ impl Setup {
         }
         let slots = t / u64::from(self.dwell);
         let (sweep, slot) = (slots / self.slots_per_sweep(), slots % self.slots_per_sweep());
-        let (k, complement) = if self.differential {
-            (slot / 2, self.complement(sweep, slot))
+        let (k, complement, inverted) = if self.differential {
+            let second_pair = self.alternating && sweep % 4 >= 2;
+            (slot / 2, self.complement(sweep, slot), second_pair)
         } else {
-            (slot, false)
+            (slot, false, false)
         };
         let pattern = u32::from(self.pattern(k as u16));
         let sign_lines = |half: u32, inverted: bool| {
             (0..32).map(|i| (((half & i).count_ones() % 2) ^ u32::from(inverted)) << i).sum()
         };
         Lines {
-            rows: sign_lines(pattern >> 5, complement),
-            columns: sign_lines(pattern & 31, false),
+            rows: sign_lines(pattern >> 5, complement != inverted),
+            columns: sign_lines(pattern & 31, inverted),
             enable: true,
         }
     }

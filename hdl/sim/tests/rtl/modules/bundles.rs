@@ -63,7 +63,7 @@ pub const SETTINGS: [usize; 27] =
 /// Bits of the fields of `types::Stamp`.
 pub const STAMP: [usize; 3] = [16, 64, 64];
 /// Bits of the fields of `types::Place`.
-pub const PLACE: [usize; 10] = [1, 1, 1, 1, 10, 1, 1, 1, 1, 1];
+pub const PLACE: [usize; 11] = [1, 1, 1, 1, 10, 1, 1, 1, 1, 1, 1];
 /// Bits of the fields of `types::Header`.
 pub const HEADER: [usize; 6] = [16, 32, 32, 32, 64, 64];
 
@@ -137,6 +137,7 @@ pub struct Place {
     pub counts: bool,
     pub index: u64,
     pub complement: bool,
+    pub inverted: bool,
     pub sweep_first: bool,
     pub frame_first: bool,
     pub frame_last: bool,
@@ -153,8 +154,8 @@ impl Place {
         }
         let (slot, of_slot) = (clock / settings.dwell, clock % settings.dwell);
         let pattern = slot / settings.halves();
-        let is_swapped = settings.alternating
-            && (frame * settings.sweeps + pattern / settings.patterns) % 2 == 1;
+        let sweep = frame * settings.sweeps + pattern / settings.patterns;
+        let is_swapped = settings.alternating && sweep % 2 == 1;
         let frame_last = clock == settings.frame_clocks() - 1;
         Some(Self {
             slot_first: of_slot == 0,
@@ -162,6 +163,7 @@ impl Place {
             counts: of_slot >= settings.blank,
             index: pattern % settings.patterns,
             complement: settings.differential && (slot % 2 == 1) != is_swapped,
+            inverted: settings.alternating && sweep % 4 >= 2,
             sweep_first: pattern / settings.patterns == 0,
             frame_first: clock == 0,
             frame_last,
@@ -176,7 +178,7 @@ impl Place {
     pub fn from_fields(fields: &[u64]) -> Option<Self> {
         let is = |field: usize| fields[field] != 0;
         if !is(0) {
-            let marks = [1, 2, 3, 7, 8, 9].map(is);
+            let marks = [1, 2, 3, 8, 9, 10].map(is);
             assert!(!marks.contains(&true), "marks outside of a run: {fields:?}");
             return None;
         }
@@ -186,16 +188,17 @@ impl Place {
             counts: is(3),
             index: fields[4],
             complement: is(5),
-            sweep_first: is(6),
-            frame_first: is(7),
-            frame_last: is(8),
-            run_last: is(9),
+            inverted: is(6),
+            sweep_first: is(7),
+            frame_first: is(8),
+            frame_last: is(9),
+            run_last: is(10),
         })
     }
 
     /// The fields for a position; all 0 outside a run.
     pub fn fields(place: Option<Self>) -> Vec<Field> {
-        let values = place.map_or([0; 10], |place| {
+        let values = place.map_or([0; 11], |place| {
             [
                 1,
                 place.slot_first.into(),
@@ -203,6 +206,7 @@ impl Place {
                 place.counts.into(),
                 place.index,
                 place.complement.into(),
+                place.inverted.into(),
                 place.sweep_first.into(),
                 place.frame_first.into(),
                 place.frame_last.into(),
