@@ -84,6 +84,7 @@ pub(crate) fn check(
     }
     if configuration.differential {
         mode |= mode::DIFFERENTIAL;
+        mode |= if configuration.alternating { mode::ALTERNATING } else { 0 };
     }
     if configuration.source == SampleSource::TestPattern {
         mode |= mode::TEST_SOURCE;
@@ -144,6 +145,10 @@ impl Light<'_> {
         self.setup.mode & mode::DIFFERENTIAL != 0
     }
 
+    fn alternating(&self) -> bool {
+        self.setup.mode & mode::ALTERNATING != 0
+    }
+
     /// Mean light over a whole sweep, in thousandths of the full array, rounded to nearest.
     fn mean_permille(&self) -> u16 {
         let patterns = u32::from(self.setup.patterns);
@@ -166,9 +171,15 @@ impl Light<'_> {
         let slot = u64::from(self.setup.dwell);
         let sweeps = window.checked_div(sweep).unwrap_or(0);
         let rest = window.checked_rem(sweep).unwrap_or(0);
-        // In whole sweeps the dark complement balances the pattern that lights all LEDs.
-        let whole = if self.differential() { 0 } else { sweeps.saturating_mul(slot) };
-        let extra = if self.shows_all_lit { whole.saturating_add(slot.min(rest)) } else { 0 };
+        let extra = match (self.shows_all_lit, self.differential(), self.alternating()) {
+            (false, ..) => 0,
+            (true, false, _) => sweeps.saturating_mul(slot).saturating_add(slot.min(rest)),
+            // In whole sweeps the dark complement balances the pattern that lights all LEDs.
+            (true, true, false) => slot.min(rest),
+            // A sweep that shows the complement first ends its pair with all LEDs lit, and the next
+            // one begins its pair so: between the two dark slots there are two lit ones.
+            (true, true, true) => window.min(slot.saturating_mul(2)),
+        };
         let light = window.saturating_add(extra);
         let permille = light.saturating_mul(1000).div_ceil(window.saturating_mul(2));
         u32::try_from(permille).unwrap_or(u32::MAX)
@@ -184,6 +195,7 @@ mod tests {
         order: PatternOrder::Natural,
         patterns: 1024,
         differential: true,
+        alternating: true,
         clocks_per_pattern: 5,
         blanked: 2,
         adc_latency: 3,
@@ -242,21 +254,41 @@ mod tests {
         let slot = clock / u64::from(setup.dwell);
         let differential = setup.mode & mode::DIFFERENTIAL != 0;
         let slots = u64::from(setup.patterns) * if differential { 2 } else { 1 };
-        match (slot % slots, differential) {
-            (0, _) => 2,
-            (1, true) => 0,
+        let is_swapped = setup.mode & mode::ALTERNATING != 0 && slot / slots % 2 == 1;
+        match (slot % slots, differential, is_swapped) {
+            (0, _, false) | (1, true, true) => 2,
+            (1, true, false) | (0, _, true) => 0,
             _ => 1,
         }
+    }
+
+    #[test]
+    fn sweeps_that_alternate_show_all_leds_for_two_slots_in_a_row() {
+        let long = Configuration { patterns: 1, clocks_per_pattern: 40_000, sweeps: 1, ..PAIRS };
+        let tight = Limits { duty_permille_max: 535, ..Limits::default() };
+        let over = ConfigProblem::OutOfRange {
+            field: ConfigField::DutyPermille,
+            found: 539,
+            min: 0,
+            max: 535,
+        };
+        assert_eq!(check(&long, &tight), Err(over));
+        assert!(check(&Configuration { alternating: false, ..long }, &tight).is_ok());
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(16))]
         #[test]
         fn no_window_is_brighter_than_the_peak(
-            patterns in 1u16..9, dwell: u16, short in 0u16..15, differential: bool, start in 0u64..1 << 22,
+            patterns in 1u16..9, dwell: u16, short in 0u16..15,
+            pairs: [bool; 2], start in 0u64..1 << 22,
         ) {
             let setup = Setup {
-                mode: if differential { mode::DIFFERENTIAL } else { 0 },
+                mode: match pairs {
+                    [false, _] => 0,
+                    [true, false] => mode::DIFFERENTIAL,
+                    [true, true] => mode::DIFFERENTIAL | mode::ALTERNATING,
+                },
                 patterns, dwell: (dwell >> short).max(1), blank: 0, latency: 0, sweeps: 1,
                 over_range_trip: 0, duty_permille: 0,
             };
@@ -264,7 +296,10 @@ mod tests {
             let window = u64::from(DUTY_WINDOW);
             let from = |start: u64| (start..start + window).map(|c| light(&setup, c)).sum::<u64>();
             prop_assert!(from(start) * 1000 <= peak * 2 * window);
-            if !differential {
+            // The last slot of a pair whose complement comes first.
+            let lit = setup.sweep_clocks() + u64::from(setup.dwell);
+            prop_assert!(from(lit) * 1000 <= peak * 2 * window);
+            if !pairs[0] {
                 // The bound is tight: a run's first window is the brightest.
                 prop_assert_eq!((from(0) * 1000).div_ceil(2 * window), peak);
             }

@@ -305,6 +305,7 @@ pub fn stretch<P: TimedPort>(
         order: PatternOrder::Natural,
         patterns,
         differential: true,
+        alternating: true,
         clocks_per_pattern: 5,
         blanked: 2,
         adc_latency: 3,

@@ -81,6 +81,7 @@ impl Bench {
             order: PatternOrder::Sequency,
             patterns: 1024,
             differential: true,
+            alternating: true,
             clocks_per_pattern: 5,
             blanked: 2,
             adc_latency: 6,

@@ -353,6 +353,7 @@ pub fn configuration(patterns: u16) -> Configuration<'static> {
         order: PatternOrder::Natural,
         patterns,
         differential: true,
+        alternating: true,
         clocks_per_pattern: 5,
         blanked: 2,
         adc_latency: 3,

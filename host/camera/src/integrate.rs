@@ -152,7 +152,8 @@ impl Integrated {
         let noise = self.noise(setup);
         if setup.differential {
             if let Some(leak) = &leak {
-                leak.correct_differential(&mut values);
+                let sweep = if setup.alternating { Sweep::Alternating } else { Sweep::Repeating };
+                leak.correct_differential(&mut values, sweep);
             }
             let measurements = Measurements::from_differential(&setup.rows, &values)?;
             return with_noise(measurements, noise);
@@ -160,7 +161,7 @@ impl Integrated {
         let dark = settling.map(|settling| settling.dark_counts);
         values.iter_mut().for_each(|value| *value -= dark.unwrap_or(0.0));
         if let Some(leak) = &leak {
-            leak.correct_single(&mut values, Sweep::Repeating);
+            leak.correct_single(&mut values);
         }
         let mut measurements = Measurements::from_single(&setup.rows, &values)?;
         if dark.is_none() {

@@ -24,6 +24,11 @@ pub struct MeasurementSetup {
     pub rows: Rows,
     /// Whether each pattern is followed by its complement.
     pub differential: bool,
+    /// Whether sweeps differ so that the faults of LEDs and lines cancel in every four
+    /// ([`mode::ALTERNATING`](nirspi_wire::register::mode::ALTERNATING)). Changes nothing unless
+    /// `differential`.
+    #[serde(default)]
+    pub alternating: bool,
     /// ADC clocks for which each pattern is shown.
     pub clocks_per_pattern: u16,
     /// ADC samples excluded at the start of each pattern.
@@ -74,8 +79,8 @@ impl MeasurementSetup {
         format!("{:08x}", nirspi_wire::crc32(setup.to_string().as_bytes()))
     }
 
-    /// The first `round(sampling * 1024)` patterns of `order` (at least one), differential, at 25
-    /// MHz, with two of five samples blanked.
+    /// The first `round(sampling * 1024)` patterns of `order` (at least one), differential and
+    /// alternating, at 25 MHz, with two of five samples blanked.
     ///
     /// # Errors
     /// If the order is not a permutation of the 1024 patterns.
@@ -85,6 +90,7 @@ impl MeasurementSetup {
             order: order.to_string(),
             rows: order.rows(Side::INSTRUMENT)?.first(patterns as usize),
             differential: true,
+            alternating: true,
             clocks_per_pattern: CLOCKS_PER_PATTERN,
             blanked: 2,
             adc_latency: 0,
@@ -145,6 +151,7 @@ impl MeasurementSetup {
             order,
             patterns: self.rows.len() as u16,
             differential: self.differential,
+            alternating: self.alternating,
             clocks_per_pattern: self.clocks_per_pattern,
             blanked: self.blanked,
             adc_latency: self.adc_latency,

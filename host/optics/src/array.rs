@@ -12,9 +12,10 @@ use crate::{Footprint, LEDS, Light, SIDE};
 use foldhash::fast::FixedState;
 use std::collections::HashMap;
 
-/// The most line states kept. A sweep has 1024 patterns and their complements. Twice that number
-/// leaves room for an injected fault, and limits the table for any other driver.
-const MEMO_LIMIT: usize = 4 * LEDS;
+/// The most line states, and changes of lines, kept. Four sweeps have 1024 patterns and their complements
+/// in two orders, and with all lines inverted. Twice that number leaves room for an injected fault, and
+/// limits the table for any other driver.
+const MEMO_LIMIT: usize = 16 * LEDS;
 
 /// LEDs along a side of a tile, which has a supply of its own.
 const TILE: usize = 8;
@@ -35,17 +36,10 @@ pub struct LedArray {
     last: Option<(u64, f32)>,
     /// The lines of the clock before, and whether they were enabled.
     before: (u64, bool),
-    /// The light of enabled lines after other enabled lines, by the later ones: a sweep has the same ones before.
-    steps: HashMap<u64, Step, FixedState>,
+    /// The light of enabled lines after other enabled lines, which come first.
+    steps: HashMap<[u64; 2], Light, FixedState>,
     /// The light of `before`.
     held: Option<f32>,
-}
-
-/// Enabled lines that came after others.
-#[derive(Debug, Clone, Copy)]
-struct Step {
-    before: u64,
-    light: Light,
 }
 
 /// Light of line states, remembered.
@@ -153,15 +147,15 @@ impl LedArray {
         let now = u64::from(rows) << 32 | u64::from(cols);
         let (before, was_enabled) = std::mem::replace(&mut self.before, (now, enabled));
         let both = enabled && was_enabled;
-        let light = match self.steps.get(&now) {
-            Some(step) if both && step.before == before => step.light,
+        let light = match self.steps.get(&[before, now]) {
+            Some(light) if both => *light,
             _ => {
                 let light = self.switched_light(before, was_enabled, now, enabled);
                 if both {
                     if self.steps.len() >= MEMO_LIMIT {
                         self.steps.clear();
                     }
-                    self.steps.insert(now, Step { before, light });
+                    self.steps.insert([before, now], light);
                 }
                 light
             }
@@ -205,6 +199,8 @@ impl Sums {
 
     /// The light of these lines, enabled.
     fn of(&mut self, electrons: &[f32], rows: u32, cols: u32, tile_sag: f64) -> f32 {
+        // An LED is lit where its two lines are equal, so inverted lines light the same LEDs.
+        let (rows, cols) = if cols & 1 == 1 { (!rows, !cols) } else { (rows, cols) };
         let lines = u64::from(rows) << 32 | u64::from(cols);
         if self.memo.len() >= MEMO_LIMIT {
             self.clear();

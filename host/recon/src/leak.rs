@@ -8,8 +8,7 @@
 //! # Model
 //! With taps `r`, the reading of slot `i` is `y[i] = sum_j r[j] x[i - j]`: `r[0]` is the share of
 //! its own signal `x` that a slot keeps, and `r[j]` the share that it gets from the slot `j` slots
-//! before. A repeating sweep is preceded by itself (cyclic); a single sweep is preceded by
-//! darkness.
+//! before. Sweeps repeat, so the first slots get their share from the last.
 //!
 //! # Differential pairs
 //! Pattern and complement alternate, `x[2k] = (S + h[k]) / 2` and `x[2k+1] = (S - h[k]) / 2`, where
@@ -20,9 +19,9 @@
 //! `d[k] = sum_m c[m] h[k - m]`, with `c[m] = r[2m] - r[2m-1] / 2 - r[2m+1] / 2` (taps outside the
 //! list are 0).
 //!
-//! `S` cancels in a repeating sweep. In a sweep that starts from darkness, pair `k` also has the
-//! term `-S r[2k+1] / 2`: the light that its complement got from the first pattern, while its
-//! pattern got none.
+//! `S` cancels. A sweep that shows each complement before its pattern is the same with all signs of
+//! `h` exchanged, and so are its differences. Where such sweeps follow others by turns
+//! ([`Sweep::Alternating`]), `h[k - m]` of the sweep before therefore counts with the sign -.
 
 use thiserror::Error;
 
@@ -60,13 +59,13 @@ pub enum LeakError {
     },
 }
 
-/// What came before the first slot of the readings.
+/// How a sweep of pairs follows the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sweep {
-    /// The same sweep, because sweeps repeat.
+    /// It is the same.
     Repeating,
-    /// No light.
-    FromDark,
+    /// It shows the same pairs with pattern and complement exchanged in time.
+    Alternating,
 }
 
 impl Leak {
@@ -99,25 +98,15 @@ impl Leak {
         &self.taps
     }
 
-    /// Corrects readings in time order, one for each slot: patterns alone, or patterns alternating
-    /// with their complements.
-    pub fn correct_single(&self, y: &mut [f64], sweep: Sweep) {
-        undo(&self.taps, y, sweep);
+    /// Corrects the readings of a repeating sweep in time order, one for each slot: patterns alone, or
+    /// patterns alternating with their complements.
+    pub fn correct_single(&self, y: &mut [f64]) {
+        undo(&self.taps, y, Sweep::Repeating);
     }
 
-    /// Corrects the differences of a repeating sweep, in time order and complete.
-    pub fn correct_differential(&self, d: &mut [f64]) {
-        undo(&self.pair_taps(), d, Sweep::Repeating);
-    }
-
-    /// Corrects the differences of a sweep that started from darkness. `pair_sum` is the light `S`
-    /// of a pattern and its complement together, in the units of `d`: the reading of the all-ones
-    /// pattern less the dark level.
-    pub fn correct_differential_from_dark(&self, d: &mut [f64], pair_sum: f64) {
-        for (d, odd) in d.iter_mut().zip(self.taps.iter().skip(1).step_by(2)) {
-            *d += pair_sum * odd / 2.0;
-        }
-        undo(&self.pair_taps(), d, Sweep::FromDark);
+    /// Corrects the differences of a sweep, in time order and complete.
+    pub fn correct_differential(&self, d: &mut [f64], sweep: Sweep) {
+        undo(&self.pair_taps(), d, sweep);
     }
 
     /// The taps `c` of the differences, in pairs.
@@ -141,20 +130,19 @@ fn undo(taps: &[f64], y: &mut [f64], sweep: Sweep) {
     let leaked = y.to_vec();
     let from_earlier = |x: &[f64], i: usize| -> f64 {
         let history = taps[1..].iter().enumerate();
-        match sweep {
-            Sweep::FromDark => history.take(i).map(|(j, tap)| tap * x[i - 1 - j]).sum(),
-            Sweep::Repeating => {
-                history.map(|(j, tap)| tap * x[(i + count * (1 + j / count) - 1 - j) % count]).sum()
-            }
-        }
+        history
+            .map(|(j, tap)| {
+                let sweeps_ago = (count + j - i) / count;
+                let x = x[i + count * sweeps_ago - 1 - j];
+                let is_swapped = sweep == Sweep::Alternating && sweeps_ago % 2 == 1;
+                if is_swapped { -tap * x } else { tap * x }
+            })
+            .sum()
     };
-    // From darkness one pass is exact. In a cycle the first slots depend on the last, so
-    // Gauss-Seidel passes follow, each of which shrinks the error at least by the leaked share.
+    // The first slots depend on the last, so Gauss-Seidel passes follow each other, each of which
+    // shrinks the error at least by the leaked share.
     let share = taps[1..].iter().map(|tap| tap.abs()).sum::<f64>() / taps[0];
-    let passes = match sweep {
-        Sweep::FromDark => 1,
-        Sweep::Repeating => (f64::EPSILON.ln() / share.ln()).ceil().max(1.0) as usize + 1,
-    };
+    let passes = (f64::EPSILON.ln() / share.ln()).ceil().max(1.0) as usize + 1;
     for _ in 0..passes {
         let mut settled = true;
         for i in 0..count {
@@ -173,21 +161,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn leaked(taps: &[f64], x: &[f64], sweep: Sweep) -> Vec<f64> {
+    /// The readings of slots that repeat for ever.
+    fn leaked(taps: &[f64], x: &[f64]) -> Vec<f64> {
         let count = x.len() as i64;
-        (0..count)
-            .map(|i| {
-                let earlier = taps.iter().enumerate().map(|(j, tap)| (tap, i - j as i64));
-                match sweep {
-                    Sweep::Repeating => {
-                        earlier.map(|(tap, k)| tap * x[k.rem_euclid(count) as usize]).sum::<f64>()
-                    }
-                    Sweep::FromDark => {
-                        earlier.filter(|(_, k)| *k >= 0).map(|(tap, k)| tap * x[k as usize]).sum()
-                    }
-                }
-            })
-            .collect()
+        let earlier = |i: i64| taps.iter().zip(0..).map(move |(tap, j)| (tap, i - j));
+        let read = |i| earlier(i).map(|(tap, k)| tap * x[k.rem_euclid(count) as usize]).sum();
+        (0..count).map(read).collect()
     }
 
     fn leaks() -> impl Strategy<Value = Vec<f64>> {
@@ -212,12 +191,9 @@ mod tests {
         fn correcting_readings_undoes_leaking(
             taps in leaks(), x in prop::collection::vec(-1.0..1.0, 1..80)
         ) {
-            let leak = Leak::new(taps.clone()).unwrap();
-            for sweep in [Sweep::Repeating, Sweep::FromDark] {
-                let mut y = leaked(&taps, &x, sweep);
-                leak.correct_single(&mut y, sweep);
-                prop_assert!(close(&y, &x), "{:?}", sweep);
-            }
+            let mut y = leaked(&taps, &x);
+            Leak::new(taps).unwrap().correct_single(&mut y);
+            prop_assert!(close(&y, &x));
         }
 
         #[test]
@@ -225,15 +201,22 @@ mod tests {
             taps in leaks(), h in prop::collection::vec(-1.0..1.0, 1..40), sum in 1.0..3.0
         ) {
             let leak = Leak::new(taps.clone()).unwrap();
-            let x: Vec<f64> = h.iter().flat_map(|h| [(sum + h) / 2.0, (sum - h) / 2.0]).collect();
-            for sweep in [Sweep::Repeating, Sweep::FromDark] {
-                let y = leaked(&taps, &x, sweep);
-                let mut d: Vec<f64> = y.as_chunks::<2>().0.iter().map(|[p, m]| p - m).collect();
-                match sweep {
-                    Sweep::Repeating => leak.correct_differential(&mut d),
-                    Sweep::FromDark => leak.correct_differential_from_dark(&mut d, sum),
-                }
-                prop_assert!(close(&d, &h), "{:?}", sweep);
+            let pairs = |sign: f64| {
+                h.iter().flat_map(move |h| [(sum + sign * h) / 2.0, (sum - sign * h) / 2.0])
+            };
+            let differences = |y: &[f64]| -> Vec<f64> {
+                y.as_chunks::<2>().0.iter().map(|[first, second]| first - second).collect()
+            };
+            let mut d = differences(&leaked(&taps, &pairs(1.0).collect::<Vec<_>>()));
+            leak.correct_differential(&mut d, Sweep::Repeating);
+            prop_assert!(close(&d, &h));
+
+            let y = leaked(&taps, &pairs(1.0).chain(pairs(-1.0)).collect::<Vec<_>>());
+            let (plain, swapped) = y.split_at(2 * h.len());
+            for (sign, y) in [(1.0, plain), (-1.0, swapped)] {
+                let mut d: Vec<f64> = differences(y).iter().map(|d| sign * d).collect();
+                leak.correct_differential(&mut d, Sweep::Alternating);
+                prop_assert!(close(&d, &h), "{sign}");
             }
         }
     }
@@ -261,8 +244,8 @@ mod tests {
             let taps = vec![own, Leak::LARGEST_SHARE * own];
             let leak = Leak::new(taps.clone()).unwrap();
             let x: Vec<f64> = (0..8).map(|i| f64::from(i * i % 5) - 2.0).collect();
-            let mut y = leaked(&taps, &x, Sweep::Repeating);
-            leak.correct_single(&mut y, Sweep::Repeating);
+            let mut y = leaked(&taps, &x);
+            leak.correct_single(&mut y);
             assert!(close(&y, &x), "{own}: {y:?}");
         }
     }

@@ -1,15 +1,15 @@
 //! What is left in an image of LEDs that rise unlike they fall, for several orders of pattern and complement within a pair:
-//! pattern always first, alternating from sweep to sweep, random from pattern to pattern, and random with alternation.
+//! pattern always first, alternating from sweep to sweep, the same with all lines inverted in every second pair of sweeps,
+//! random from pattern to pattern, and random with alternation.
 //!
 //! `cargo run --release -p nirspi-virtual --example orders_of_pairs [CAMERA [CROSSTALK_FF]]`. No gateware: the lines are set
-//! by this program, because the gateware shows the pattern first. The receiver is without noise but for a dither of one
+//! by this program, because the gateware knows one of these orders alone. The receiver is without noise but for a dither of one
 //! count. Readings of all slots are undone by the mean of rise and fall. docs/physics.md has the result.
 
 use nirspi::response::Settling;
 use nirspi::scene::SceneSource;
 use nirspi_optics::{Chain, ChainSettings, Footprint, LedArray, Scene};
 use nirspi_recon::fwht::fwht;
-use nirspi_recon::leak::Sweep;
 use nirspi_recon::{Order, Side};
 use nirspi_virtual::{CameraModel, VirtualOptics, read_camera_model};
 use std::error::Error;
@@ -24,48 +24,70 @@ fn lines(k: u32) -> u32 {
     (0..32).fold(0, |lines, i| lines | ((k & i).count_ones() & 1) << i)
 }
 
-/// Whether the complement of pattern `at` comes first in this sweep.
-type First = fn(at: usize, sweep: usize) -> bool;
+/// How pattern `at` of a sweep is shown.
+struct Pair {
+    complement_first: bool,
+    /// All lines are inverted, which lights the same LEDs.
+    inverted: bool,
+}
+
+impl Pair {
+    fn complement_first(complement_first: bool) -> Self {
+        Self { complement_first, inverted: false }
+    }
+}
+
+type Shown = fn(at: usize, sweep: usize) -> Pair;
 
 fn random(at: usize) -> bool {
     (at as u32).wrapping_add(1).wrapping_mul(0x9e37_79b1).count_ones() % 2 == 1
 }
 
-const ORDERS: [(&str, First); 4] = [
-    ("pattern first", |_, _| false),
-    ("alternating", |_, sweep| sweep % 2 == 1),
-    ("random", |at, _| random(at)),
-    ("random, alternating", |at, sweep| random(at) ^ (sweep % 2 == 1)),
+const ORDERS: [(&str, Shown); 5] = [
+    ("pattern first", |_, _| Pair::complement_first(false)),
+    ("alternating", |_, sweep| Pair::complement_first(sweep % 2 == 1)),
+    ("alternating, inverted lines", |_, sweep| Pair {
+        complement_first: sweep % 2 == 1,
+        inverted: sweep / 2 % 2 == 1,
+    }),
+    ("random", |at, _| Pair::complement_first(random(at))),
+    ("random, alternating", |at, sweep| Pair::complement_first(random(at) ^ (sweep % 2 == 1))),
 ];
+/// Sweeps after which every order repeats.
+const PERIOD: usize = 4;
 
 /// Differences of pattern and complement in the order of the rows, in electrons a sample.
 fn measured(
     array: &mut LedArray,
     settings: ChainSettings,
     rows: &[u32],
-    first: First,
+    shown: Shown,
 ) -> Result<Vec<f64>, Box<dyn Error>> {
     let mut chain = Chain::new(settings, 1)?;
-    // Two sweeps are a period of every order, and one of them more lets the LEDs forget that they were dark.
-    let mut slots = vec![0.0; 4 * rows.len()];
-    for sweep in 0..SWEEPS + 2 {
+    // The first period lets the LEDs forget that they were dark.
+    let mut slots = vec![0.0; PERIOD * 2 * rows.len()];
+    for sweep in 0..SWEEPS + PERIOD {
         for (at, &row) in rows.iter().enumerate() {
+            let Pair { complement_first, inverted } = shown(at, sweep);
             for half in 0..2 {
-                let complement = first(at, sweep) ^ (half == 1);
-                let (r, c) = (lines(row / 32), lines(row % 32));
+                let complement = complement_first ^ (half == 1);
+                let invert = |lines: u32, is: bool| if is { !lines } else { lines };
+                let r = invert(lines(row / 32), complement ^ inverted);
+                let c = invert(lines(row % 32), inverted);
                 let mut sum = 0.0;
                 for clock in 0..DWELL {
-                    let light = array.step(if complement { !r } else { r }, c, true);
+                    let light = array.step(r, c, true);
                     let counts = f64::from(chain.sample(light).counts);
                     sum += if clock < BLANKED { 0.0 } else { counts };
                 }
-                if sweep >= 2 {
-                    slots[(sweep % 2 * rows.len() + at) * 2 + half] += sum;
+                if sweep >= PERIOD {
+                    slots[(sweep % PERIOD * rows.len() + at) * 2 + half] += sum;
                 }
             }
         }
     }
-    let scale = settings.electrons_per_count / f64::from(DWELL - BLANKED) / (SWEEPS / 2) as f64;
+    let scale =
+        settings.electrons_per_count / f64::from(DWELL - BLANKED) / (SWEEPS / PERIOD) as f64;
     slots.iter_mut().for_each(|sum| *sum *= scale);
     let exact = Settling {
         adc_latency: 0,
@@ -74,13 +96,13 @@ fn measured(
         step_counts: 0.0,
         noise_counts: 0.0,
     };
-    exact.leak(DWELL, BLANKED)?.correct_single(&mut slots, Sweep::Repeating);
+    exact.leak(DWELL, BLANKED)?.correct_single(&mut slots);
     let mut differences = vec![0.0; rows.len()];
-    for sweep in 0..2 {
+    for sweep in 0..PERIOD {
         for (at, difference) in differences.iter_mut().enumerate() {
             let pair = (sweep * rows.len() + at) * 2;
-            let sign = if first(at, sweep) { -0.5 } else { 0.5 };
-            *difference += sign * (slots[pair] - slots[pair + 1]);
+            let sign = if shown(at, sweep).complement_first { -1.0 } else { 1.0 };
+            *difference += sign * (slots[pair] - slots[pair + 1]) / PERIOD as f64;
         }
     }
     Ok(differences)
@@ -144,9 +166,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             for count in [PIXELS, PIXELS / 2] {
                 let rows = &all[..count];
                 let truth = truth(optics.footprint(), rows)?;
-                for (order_name, first) in ORDERS {
+                for (order_name, shown) in ORDERS {
                     let mut array = optics.led_array();
-                    let seen = image(&measured(&mut array, settings, rows, first)?, rows)?;
+                    let seen = image(&measured(&mut array, settings, rows, shown)?, rows)?;
                     let white = optics.budget().electrons_per_led;
                     let seen: Vec<f64> = seen.iter().map(|electrons| electrons / white).collect();
                     let corner = seen[0] - truth[0];

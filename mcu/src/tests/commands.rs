@@ -112,6 +112,7 @@ fn a_configuration_is_in_the_registers_to_the_last_bit() {
         order: PatternOrder::Table(words),
         patterns: 1024,
         differential: true,
+        alternating: true,
         clocks_per_pattern: 9,
         blanked: 4,
         adc_latency: 63,
@@ -121,7 +122,11 @@ fn a_configuration_is_in_the_registers_to_the_last_bit() {
     };
     assert_eq!(bench.ask(Command::Configure(configuration)), Ok(Answer::Done));
     assert_eq!(bench.camera.state(), State::Configured);
-    let modes = mode::DIFFERENTIAL | mode::ORDER_TABLE | mode::TEST_SOURCE | mode::PACKETS;
+    let modes = mode::DIFFERENTIAL
+        | mode::ALTERNATING
+        | mode::ORDER_TABLE
+        | mode::TEST_SOURCE
+        | mode::PACKETS;
     for (register, value) in [
         (Register::Mode, modes),
         (Register::Patterns, 1024),

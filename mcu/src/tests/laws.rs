@@ -165,7 +165,7 @@ enum Step {
 #[derive(Debug, Clone)]
 enum Order {
     Hello(u16),
-    Configure { patterns: u16, dwell: u16, blanked: u16, sweeps: u32, differential: bool },
+    Configure { patterns: u16, dwell: u16, blanked: u16, sweeps: u32, pairs: [bool; 2] },
     Start(Option<u32>),
     Stop,
     Status,
@@ -179,9 +179,9 @@ enum Order {
 fn order() -> impl Strategy<Value = Order> {
     prop_oneof![
         2 => (1u16..3).prop_map(Order::Hello),
-        4 => (0u16..1100, 0u16..12, 0u16..4, 0u32..3, any::<bool>()).prop_map(
-            |(patterns, dwell, blanked, sweeps, differential)| Order::Configure {
-                patterns, dwell, blanked, sweeps, differential,
+        4 => (0u16..1100, 0u16..12, 0u16..4, 0u32..3, any::<[bool; 2]>()).prop_map(
+            |(patterns, dwell, blanked, sweeps, pairs)| Order::Configure {
+                patterns, dwell, blanked, sweeps, pairs,
             }
         ),
         4 => proptest::option::of(0u32..5).prop_map(Order::Start),
@@ -218,11 +218,13 @@ fn step() -> impl Strategy<Value = Step> {
 fn bytes_of(id: u16, order: &Order) -> Vec<u8> {
     let command = match *order {
         Order::Hello(protocol) => Command::Hello { protocol },
-        Order::Configure { patterns, dwell, blanked, sweeps, differential } => {
+        Order::Configure { patterns, dwell, blanked, sweeps, pairs } => {
+            let [differential, alternating] = pairs;
             Command::Configure(Configuration {
                 order: PatternOrder::Sequency,
                 patterns,
                 differential,
+                alternating,
                 clocks_per_pattern: dwell,
                 blanked,
                 adc_latency: 0,

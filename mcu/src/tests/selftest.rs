@@ -29,7 +29,7 @@ fn a_good_device_passes_everything_in_any_resting_state() {
     let mut bench = Bench::configured();
     assert_eq!(self_test(&mut bench), Report { ran: ALL, failed: 0 });
     assert_eq!(bench.camera.state(), State::Configured);
-    let mode = mode::DIFFERENTIAL | mode::PACKETS | mode::NARROW;
+    let mode = mode::DIFFERENTIAL | mode::ALTERNATING | mode::PACKETS | mode::NARROW;
     assert_eq!(bench.fpga.get(Register::Mode), mode, "the configuration is back");
     assert_eq!(bench.fpga.get(Register::Patterns), 4);
     bench.fpga.instant = false;

@@ -142,6 +142,7 @@ pub const SMALL: Configuration<'static> = Configuration {
     order: PatternOrder::Natural,
     patterns: 4,
     differential: true,
+    alternating: true,
     clocks_per_pattern: 5,
     blanked: 2,
     adc_latency: 3,

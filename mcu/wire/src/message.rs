@@ -129,6 +129,9 @@ pub struct Configuration<'a> {
     pub patterns: u16,
     /// Whether each pattern is followed by its complement, whose sum is subtracted.
     pub differential: bool,
+    /// Whether sweeps differ so that the faults of LEDs and lines cancel in every four
+    /// ([`mode::ALTERNATING`](crate::register::mode::ALTERNATING)). Changes nothing unless `differential`.
+    pub alternating: bool,
     /// Clocks that each pattern is shown: 5 is 25 MHz.
     pub clocks_per_pattern: u16,
     /// Samples left out at the start of each pattern, in which LEDs and amplifier settle.

@@ -361,6 +361,7 @@ fn the_largest_messages_fit_the_largest_packets() {
         order: PatternOrder::Table(Words::from_le_bytes(&table).unwrap()),
         patterns: u16::MAX,
         differential: true,
+        alternating: true,
         clocks_per_pattern: u16::MAX,
         blanked: u16::MAX,
         adc_latency: u8::MAX,

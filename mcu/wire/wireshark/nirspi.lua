@@ -144,6 +144,7 @@ local commands = {
         if r:variant("order", PatternOrder) == "Table" then r:block("table entries", 2) end
         r:number("patterns")
         r:flag("differential")
+        r:flag("alternating")
         r:number("clocks_per_pattern")
         r:number("blanked")
         r:byte("adc_latency")

@@ -139,6 +139,7 @@ const CONFIGURATION: Configuration<'static> = Configuration {
     order: PatternOrder::Natural,
     patterns: PATTERNS,
     differential: true,
+    alternating: true,
     clocks_per_pattern: 5,
     blanked: 2,
     adc_latency: 3,

@@ -81,6 +81,7 @@ fn burst_setup() -> MeasurementSetup {
         order: "calibration".to_owned(),
         rows: Rows::natural(Side::INSTRUMENT).first(1),
         differential: true,
+        alternating: false,
         clocks_per_pattern: HALF_PERIOD,
         blanked: 0,
         adc_latency: 0,

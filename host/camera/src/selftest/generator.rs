@@ -23,6 +23,7 @@ const SETTINGS: [Configuration<'static>; 2] = [
         order: PatternOrder::Natural,
         patterns: PATTERNS,
         differential: true,
+        alternating: true,
         clocks_per_pattern: CLOCKS_PER_PATTERN,
         blanked: 2,
         adc_latency: 3,
@@ -34,6 +35,7 @@ const SETTINGS: [Configuration<'static>; 2] = [
         order: PatternOrder::Sequency,
         patterns: 1000,
         differential: false,
+        alternating: false,
         clocks_per_pattern: 7,
         blanked: 0,
         adc_latency: 63,
@@ -110,7 +112,9 @@ fn frames(configuration: &Configuration<'_>, count: u32) -> Vec<Vec<i64>> {
                 for (sum, pattern) in sums.iter_mut().zip(0..) {
                     let slot = (sweep * patterns + pattern) * halves;
                     let complement = if halves == 2 { reading(slot + 1) } else { 0 };
-                    *sum += reading(slot) - complement;
+                    let difference = reading(slot) - complement;
+                    let is_swapped = configuration.alternating && sweep % 2 == 1;
+                    *sum += if is_swapped { -difference } else { difference };
                 }
             }
             sums

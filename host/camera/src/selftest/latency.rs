@@ -42,6 +42,7 @@ pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, Sess
             order: PatternOrder::Natural,
             patterns: 1,
             differential: true,
+            alternating: false,
             clocks_per_pattern: HALF_PERIOD,
             blanked: HALF_PERIOD - 1,
             adc_latency,

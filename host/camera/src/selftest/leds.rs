@@ -45,6 +45,7 @@ fn configuration(differential: bool, adc_latency: u8) -> Configuration<'static> 
         order: PatternOrder::Natural,
         patterns: PATTERNS,
         differential,
+        alternating: false,
         clocks_per_pattern: CLOCKS,
         blanked: BLANKED,
         adc_latency,

@@ -34,6 +34,7 @@ fn setup(sweeps: u32) -> MeasurementSetup {
         order: "natural".to_owned(),
         rows: Rows::natural(Side::INSTRUMENT),
         differential: true,
+        alternating: false,
         clocks_per_pattern: CLOCKS_PER_PATTERN,
         blanked: BLANKED,
         adc_latency: 0,

@@ -17,7 +17,7 @@ use nirspi_optics::rain::{Drops, PaperRain, RainError, Rainfall, Weather};
 use nirspi_optics::water::Water;
 use nirspi_optics::{CameraModel, LEDS, Scene, SceneError};
 use nirspi_recon::{
-    Leak, LeakError, MeasurementError, Measurements, Order, Rows, RowsError, Side, fwht,
+    Leak, LeakError, MeasurementError, Measurements, Order, Rows, RowsError, Side, Sweep, fwht,
     reconstruct,
 };
 use nirspi_virtual::{MemoryLink, VirtualOptics, VirtualOpticsError};
@@ -276,7 +276,7 @@ impl LinearCamera {
         let shown = (f64::from(sampling) * LEDS as f64).round().clamp(1.0, LEDS as f64) as usize;
         let rows = order.first(shown);
         let mut differences = self.differences(&optics, &seen, &rows, sweeps, rng);
-        self.believed.correct_differential(&mut differences);
+        self.believed.correct_differential(&mut differences, Sweep::Repeating);
         let measured = Measurements::from_differential(&rows, &differences)?;
         Ok(Taken { optics, field_mm, seen, measured })
     }

@@ -24,6 +24,7 @@ pub fn requests() -> Vec<(Request<'static>, &'static str)> {
                     order: PatternOrder::Natural,
                     patterns: 1024,
                     differential: true,
+                    alternating: true,
                     clocks_per_pattern: 5,
                     blanked: 2,
                     adc_latency: 7,
@@ -32,7 +33,7 @@ pub fn requests() -> Vec<(Request<'static>, &'static str)> {
                     over_range_trip: 4096,
                 }),
             },
-            "02 01 00 80 08 01 05 02 07 01 00 80 20",
+            "02 01 00 80 08 01 01 05 02 07 01 00 80 20",
         ),
         (
             Request {
@@ -41,6 +42,7 @@ pub fn requests() -> Vec<(Request<'static>, &'static str)> {
                     order: PatternOrder::Sequency,
                     patterns: 307,
                     differential: false,
+                    alternating: false,
                     clocks_per_pattern: 65_535,
                     blanked: 0,
                     adc_latency: 63,
@@ -49,7 +51,7 @@ pub fn requests() -> Vec<(Request<'static>, &'static str)> {
                     over_range_trip: 0,
                 }),
             },
-            "03 01 01 b3 02 00 ff ff 03 00 3f ff ff ff ff 0f 01 00",
+            "03 01 01 b3 02 00 00 ff ff 03 00 3f ff ff ff ff 0f 01 00",
         ),
         (
             Request {
@@ -58,6 +60,7 @@ pub fn requests() -> Vec<(Request<'static>, &'static str)> {
                     order: PatternOrder::Table(words(&[0x03, 0x00, 0xFF, 0x03, 0x00, 0x00])),
                     patterns: 3,
                     differential: true,
+                    alternating: false,
                     clocks_per_pattern: 5,
                     blanked: 2,
                     adc_latency: 0,
@@ -66,7 +69,7 @@ pub fn requests() -> Vec<(Request<'static>, &'static str)> {
                     over_range_trip: 4096,
                 }),
             },
-            "04 01 02 06 03 00 ff 03 00 00 03 01 05 02 00 01 00 80 20",
+            "04 01 02 06 03 00 ff 03 00 00 03 01 00 05 02 00 01 00 80 20",
         ),
         (Request { id: 5, command: Command::Start(RunLength::Continuous) }, "05 02 00"),
         (Request { id: 6, command: Command::Start(RunLength::Frames(1000)) }, "06 02 01 e8 07"),

@@ -59,12 +59,13 @@ prop_compose! {
     fn configuration()(
         order in order(),
         (patterns, clocks_per_pattern, blanked) in any::<(u16, u16, u16)>(),
-        (differential, adc_latency, sweeps, over_range_trip) in any::<(bool, u8, u32, u32)>(),
+        (differential, alternating, adc_latency) in any::<(bool, bool, u8)>(),
+        (sweeps, over_range_trip) in any::<(u32, u32)>(),
         source in prop_oneof![Just(SampleSource::Detector), Just(SampleSource::TestPattern)],
     ) -> Configuration<'static> {
         Configuration {
-            order, patterns, differential, clocks_per_pattern, blanked, adc_latency, sweeps, source,
-            over_range_trip,
+            order, patterns, differential, alternating, clocks_per_pattern, blanked, adc_latency,
+            sweeps, source, over_range_trip,
         }
     }
 }
