@@ -86,8 +86,6 @@ struct FlatFieldReport {
     pattern_after: f64,
     /// Row and column.
     dead_leds: Vec<[u8; 2]>,
-    /// What pixel (0, 0) reads before the white sheet, in units of white: what all patterns have in common falls there.
-    first_pixel: f32,
     /// Pixels with a reading in the dark; `null` where that was not measured.
     dark_pixels: Option<usize>,
 }
@@ -96,8 +94,7 @@ impl FlatFieldReport {
     fn new(kept: &KeptFlatField, file: PathBuf) -> Self {
         let KeptFlatField { sweeps, pattern_before, pattern_after, ref flat, .. } = *kept;
         let (dead_leds, dark_pixels) = (flat.dead_leds().to_vec(), flat.dark_pixels());
-        let first_pixel = flat.first_pixel();
-        Self { file, sweeps, pattern_before, pattern_after, dead_leds, first_pixel, dark_pixels }
+        Self { file, sweeps, pattern_before, pattern_after, dead_leds, dark_pixels }
     }
 }
 

@@ -36,10 +36,53 @@ pub struct LedArray {
     last: Option<(u64, f32)>,
     /// The lines of the clock before, and whether they were enabled.
     before: (u64, bool),
-    /// The light of enabled lines after other enabled lines, which come first.
-    steps: HashMap<[u64; 2], Light, FixedState>,
+    steps: Steps,
     /// The light of `before`.
     held: Option<f32>,
+}
+
+/// Enabled lines that came after others, and their light.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    before: u64,
+    now: u64,
+    light: Light,
+}
+
+/// The steps of a run in their order, because a run repeats them in this order.
+#[derive(Debug, Clone, Default)]
+struct Steps {
+    list: Vec<Step>,
+    /// Where the next step is expected.
+    at: usize,
+}
+
+impl Steps {
+    /// The light of this step, if it is the expected one or begins the list anew.
+    #[inline]
+    fn next(&mut self, before: u64, now: u64) -> Option<Light> {
+        for at in [self.at, 0] {
+            if let Some(step) = self.list.get(at).filter(|s| s.before == before && s.now == now) {
+                self.at = at + 1;
+                return Some(step.light);
+            }
+        }
+        None
+    }
+
+    /// Adds a step that was not known, at the end. If another one was expected, the list is of another run.
+    fn push(&mut self, step: Step) {
+        if self.at < self.list.len() || self.list.len() >= MEMO_LIMIT {
+            self.clear();
+        }
+        self.list.push(step);
+        self.at = self.list.len();
+    }
+
+    fn clear(&mut self) {
+        self.list.clear();
+        self.at = 0;
+    }
 }
 
 /// Light of line states, remembered.
@@ -75,7 +118,7 @@ impl LedArray {
             switched: Sums::default(),
             last: None,
             before: (0, false),
-            steps: HashMap::default(),
+            steps: Steps::default(),
             held: None,
         }
     }
@@ -147,19 +190,14 @@ impl LedArray {
         let now = u64::from(rows) << 32 | u64::from(cols);
         let (before, was_enabled) = std::mem::replace(&mut self.before, (now, enabled));
         let both = enabled && was_enabled;
-        let light = match self.steps.get(&[before, now]) {
-            Some(light) if both => *light,
-            _ => {
-                let light = self.switched_light(before, was_enabled, now, enabled);
-                if both {
-                    if self.steps.len() >= MEMO_LIMIT {
-                        self.steps.clear();
-                    }
-                    self.steps.insert([before, now], light);
-                }
-                light
+        let known = if both { self.steps.next(before, now) } else { None };
+        let light = known.unwrap_or_else(|| {
+            let light = self.switched_light(before, was_enabled, now, enabled);
+            if both {
+                self.steps.push(Step { before, now, light });
             }
-        };
+            light
+        });
         self.held = Some(light.settled);
         light
     }

@@ -26,7 +26,7 @@ fn main() {
         let camera = read_camera_model(name).unwrap();
         let mut fpga = VirtualOptics::of(&camera, scene, 300.0).unwrap().fpga(1).unwrap();
         for (register, value) in [
-            (Register::Mode, mode::DIFFERENTIAL),
+            (Register::Mode, mode::DIFFERENTIAL | mode::ALTERNATING),
             (Register::Patterns, 1024),
             (Register::Frames, 0),
             (Register::Control, control::START),

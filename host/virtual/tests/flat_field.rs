@@ -70,15 +70,6 @@ fn a_flat_field_takes_the_pattern_of_unequal_leds_away() {
     }
 }
 
-/// The LEDs of a circuit, boards/electronics, with more light, so that few sweeps show it.
-#[test]
-fn leds_that_rise_unlike_they_fall_are_no_dead_led() {
-    let circuit = "[leds]\npower_mw = 40\nrise_ns = 12.76\nfall_ns = 16.36\nturn_on_delay_ns = 1.22\ntile_sag = 0.0165";
-    let Measured { flat, .. } = measured(circuit, 200).unwrap();
-    assert!((-4.0..-2.0).contains(&flat.first_pixel()), "{}", flat.first_pixel());
-    assert!(flat.is_first_pixel_spoiled() && flat.dead_leds().is_empty(), "{:?}", flat.dead_leds());
-}
-
 #[test]
 fn equal_leds_get_no_flat_field_and_a_dim_sheet_says_so() {
     let equal = measured("[leds]\npower_mw = 40", 80).unwrap_err();

@@ -1,7 +1,8 @@
 //! ADC latency and settling response, measured from a raw burst.
 //!
-//! All LEDs go on and off every [`HALF_PERIOD`] ADC clocks (pattern 0 and its complement). The mean
-//! of the periods is the camera's step response `s[n]`, `n` clocks after the step: 0 before the
+//! All LEDs go on and off every [`HALF_PERIOD`] ADC clocks (pattern 0 and its complement, in sweeps
+//! that alternate). Every second period has all lines inverted, so that the charge which they inject
+//! into the receiver cancels. The mean of the periods is the camera's step response `s[n]`, `n` clocks after the step: 0 before the
 //! light has passed LEDs, amplifier and ADC, and 1 when the light has settled. The clock at which
 //! the response leaves 0 is the latency. The leak, a pattern's light in later slots, follows from
 //! the response for any dwell and blanking.
@@ -26,6 +27,13 @@ use thiserror::Error;
 
 /// Clocks that the LEDs stay on, and off, in the calibration burst: 1 us.
 pub const HALF_PERIOD: u16 = response::LONGEST;
+/// Clocks of a slot of the burst. Sweeps of one pair that alternate are on, off, off, on, and so on: LEDs change
+/// after every second slot.
+const SLOT: u16 = HALF_PERIOD / 2;
+/// Clocks from the start of a burst until the LEDs first go on after they were off.
+const RISE: usize = 3 * SLOT as usize;
+/// Clocks after which the lines repeat: two periods of the light.
+const CYCLE: usize = 4 * HALF_PERIOD as usize;
 /// The step must exceed the noise of its mean by this factor.
 const MIN_STEP_TO_NOISE: f64 = 20.0;
 /// The response has left zero when it exceeds this share of the step.
@@ -81,8 +89,8 @@ fn burst_setup() -> MeasurementSetup {
         order: "calibration".to_owned(),
         rows: Rows::natural(Side::INSTRUMENT).first(1),
         differential: true,
-        alternating: false,
-        clocks_per_pattern: HALF_PERIOD,
+        alternating: true,
+        clocks_per_pattern: SLOT,
         blanked: 0,
         adc_latency: 0,
         sweeps: 1,
@@ -191,9 +199,9 @@ fn bursts(
     Ok(samples)
 }
 
-/// The mean of all periods except the first period of each burst.
+/// The mean of all periods of the light except the first two of each burst.
 struct MeanPeriod {
-    /// ADC counts by clock.
+    /// ADC counts by clock, from the clock in which the LEDs go on.
     counts: Vec<f64>,
     /// Number of periods in the mean.
     periods: f64,
@@ -203,20 +211,23 @@ struct MeanPeriod {
 
 impl MeanPeriod {
     fn of(samples: &[f64]) -> Self {
-        let period = 2 * usize::from(HALF_PERIOD);
-        // The first period of a burst starts from dark and unsettled.
+        // The first cycle of a burst starts from dark and unsettled.
         let bursts = samples.chunks_exact(usize::from(RAW_SAMPLES_MAX));
-        let periods: Vec<&[f64]> =
-            bursts.flat_map(|burst| burst.chunks_exact(period).skip(1)).collect();
-        let count = periods.len() as f64;
-        let counts: Vec<f64> =
-            (0..period).map(|n| periods.iter().map(|p| p[n]).sum::<f64>() / count).collect();
-        let variance = periods
+        let cycles: Vec<&[f64]> =
+            bursts.flat_map(|burst| burst.chunks_exact(CYCLE).skip(1)).collect();
+        let count = cycles.len() as f64;
+        let means: Vec<f64> =
+            (0..CYCLE).map(|n| cycles.iter().map(|c| c[n]).sum::<f64>() / count).collect();
+        let variance = cycles
             .iter()
-            .flat_map(|p| p.iter().zip(&counts).map(|(s, m)| (s - m).powi(2)))
+            .flat_map(|c| c.iter().zip(&means).map(|(s, m)| (s - m).powi(2)))
             .sum::<f64>()
-            / ((count - 1.0) * period as f64);
-        Self { counts, periods: count, noise_counts: variance.sqrt() }
+            / ((count - 1.0) * CYCLE as f64);
+        let (lines, inverted) = means.split_at(CYCLE / 2);
+        let mut counts: Vec<f64> =
+            lines.iter().zip(inverted).map(|(a, b)| f64::midpoint(*a, *b)).collect();
+        counts.rotate_left(RISE);
+        Self { counts, periods: 2.0 * count, noise_counts: variance.sqrt() }
     }
 }
 
@@ -288,8 +299,10 @@ mod tests {
     /// A chain of two poles behind a delay, in ADC counts.
     fn burst(latency: usize, step: f64, pole: f64) -> Vec<f64> {
         let (mut led, mut amplifier) = (0.0, 0.0);
-        let light =
-            |n: usize| if (n / usize::from(HALF_PERIOD)).is_multiple_of(2) { step } else { 0.0 };
+        let light = |n: usize| match n / usize::from(SLOT) % 4 {
+            0 | 3 => step,
+            _ => 0.0,
+        };
         let settled: Vec<f64> = (0..usize::from(RAW_SAMPLES_MAX))
             .map(|n| {
                 led += (light(n) - led) * pole;
@@ -319,19 +332,35 @@ mod tests {
     }
 
     #[test]
-    fn the_unsettled_first_period_of_each_burst_does_not_count() {
+    fn the_unsettled_first_cycle_of_each_burst_does_not_count() {
         let one = burst(7, 9000.0, 0.8);
         let samples = [&one[..], &one[..]].concat();
         let mut unsettled = samples.clone();
         for burst in unsettled.chunks_exact_mut(usize::from(RAW_SAMPLES_MAX)) {
-            burst[..2 * usize::from(HALF_PERIOD)].fill(16_000.0);
+            burst[..CYCLE].fill(16_000.0);
         }
         assert_eq!(evaluate(&unsettled).unwrap(), evaluate(&samples).unwrap());
         let known = evaluate(&samples).unwrap();
         assert_eq!(known.at_levels_of(&unsettled), known.at_levels_of(&samples));
-        // The second period counts.
-        unsettled[2 * usize::from(HALF_PERIOD)] += 1000.0;
+        // The second cycle counts.
+        unsettled[CYCLE] += 1000.0;
         assert_ne!(evaluate(&unsettled).unwrap(), evaluate(&samples).unwrap());
+    }
+
+    /// Lines that rise inject a charge, and lines that fall as much of the other sign.
+    #[test]
+    fn the_charge_of_the_lines_cancels() {
+        let clean = burst(7, 9000.0, 0.5);
+        let mut charged = clean.clone();
+        // On, off, off, on, and the same with all lines inverted: lines that rise less lines that fall, at each slot.
+        let risen = [-64.0, 32.0, 0.0, -32.0, 64.0, -32.0, 0.0, 32.0];
+        for (n, sample) in charged.iter_mut().enumerate().skip(7) {
+            let (slot, clock) = ((n - 7) / usize::from(SLOT), (n - 7) % usize::from(SLOT));
+            *sample += 100.0 * risen[slot % 8] * 0.3_f64.powi(clock as i32);
+        }
+        let (found, expected) = (evaluate(&charged).unwrap(), evaluate(&clean).unwrap());
+        assert_eq!(found.adc_latency, 7);
+        assert!((found.response[0] - expected.response[0]).abs() < 1e-9, "{:?}", found.response);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Measures the ADC's latency by stepping the FPGA's setting.
 //!
-//! All LEDs go on and off for [`HALF_PERIOD`] clocks each, and only the last clock of each slot
-//! counts. At a setting below the true latency, the FPGA takes an earlier sample of settled light
+//! All LEDs go on and off in slots of [`HALF_PERIOD`] clocks, and only the last clock of each slot
+//! counts. Sweeps alternate (on, off, off, on), so that the charge of the lines cancels, and every
+//! second slot is followed by a change. At a setting below the true latency, the FPGA takes an earlier sample of settled light
 //! as the last clock's sample. At a setting above the true latency, the FPGA takes a sample from
 //! after the change, and the difference of on and off becomes smaller. The last setting with the
 //! full difference is the latency. The raw burst, which does not use the setting, must give the
@@ -32,7 +33,7 @@ const SIGMAS: f64 = 5.0;
 pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, SessionError> {
     let from_burst = burst.adc_latency;
     let noise = burst.noise_counts * (2.0 / f64::from(SWEEPS)).sqrt();
-    if SIGMAS * noise > 2.0 * ONSET * burst.step_counts {
+    if SIGMAS * noise > ONSET * burst.step_counts {
         let reason = format!("too little light for a noise of {:.1} counts", burst.noise_counts);
         return Ok(vec![Check::skipped(NAME, &reason)]);
     }
@@ -42,7 +43,7 @@ pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, Sess
             order: PatternOrder::Natural,
             patterns: 1,
             differential: true,
-            alternating: false,
+            alternating: true,
             clocks_per_pattern: HALF_PERIOD,
             blanked: HALF_PERIOD - 1,
             adc_latency,
@@ -76,7 +77,7 @@ pub fn check(session: &mut Session, burst: &Settling) -> Result<Vec<Check>, Sess
 fn edge(differences: &[f64]) -> Option<u8> {
     let full = differences.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let fallen: Vec<bool> =
-        differences.iter().map(|difference| (1.0 - difference / full) / 2.0 > ONSET).collect();
+        differences.iter().map(|difference| 1.0 - difference / full > ONSET).collect();
     let first = fallen.iter().position(|&fallen| fallen)?;
     let falls_once = fallen.iter().skip(first).all(|&fallen| fallen);
     (full > 0.0 && falls_once).then(|| first.checked_sub(1)).flatten().map(|last| last as u8)
@@ -91,7 +92,7 @@ mod tests {
     fn differences(latency: usize, rest: f64) -> Vec<f64> {
         let fallen = |past: usize| 1.0 - rest.powi(past as i32);
         (0..=usize::from(LATENCY_MAX))
-            .map(|setting| 5000.0 * (1.0 - 2.0 * fallen(setting.saturating_sub(latency))))
+            .map(|setting| 5000.0 * (1.0 - fallen(setting.saturating_sub(latency))))
             .collect()
     }
 

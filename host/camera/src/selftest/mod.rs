@@ -3,13 +3,14 @@
 //! The self-test has stages, each of which builds on earlier stages: the device's own checks; test
 //! frames of the FPGA's generator through the whole chain; settling and latency from raw bursts;
 //! latency again, by stepping the FPGA's setting; the LEDs, by the light of each line and each
-//! pattern at the detector; the link, by its speed and its losses. Point the camera at a bright and
+//! pattern at the detector, and by the image of a white sheet at full speed; the link, by its speed and its losses. Point the camera at a bright and
 //! evenly lit target, such as white paper.
 //!
 //! # Invariant
 //! A verdict follows from a measured value and a limit, and both are shown
 //! (`check::tests::the_verdict_follows_from_value_and_limit`).
 
+mod first_pixel;
 mod generator;
 mod latency;
 mod leds;
@@ -97,6 +98,7 @@ pub fn run(
             latency::NAME,
             leds::LINES,
             leds::SUPPLY,
+            first_pixel::NAME,
             link::SPEED,
             link::LOSSES,
         ];
@@ -114,7 +116,8 @@ pub fn run(
     };
     checks.extend(light_and_settling(settling.as_ref()));
     let settling = settling.ok();
-    let (mut agrees, stages) = (false, [latency::NAME, leds::LINES, leds::SUPPLY]);
+    let (mut agrees, stages) =
+        (false, [latency::NAME, leds::LINES, leds::SUPPLY, first_pixel::NAME]);
     match settling.as_ref().filter(|settling| settling.step_counts >= min_step_counts()) {
         None => checks.extend(stages.map(|name| Check::skipped(name, "too little light"))),
         Some(settling) => {
@@ -132,8 +135,19 @@ pub fn run(
                     .map(|name| Check::skipped(name, "needs the ADC latency"))
                     .collect(),
                 Some(setting) => {
-                    let lit = leds::check(session, setting as u8, settling.noise_counts);
-                    unless_refused(&stages[1..], lit)?
+                    let latency = setting as u8;
+                    let lit = leds::check(session, latency, settling.noise_counts);
+                    let mut lit = unless_refused(&stages[1..3], lit)?;
+                    let skipped = |why| vec![Check::skipped(first_pixel::NAME, why)];
+                    lit.extend(if fpga.sampling() == Sampling::NoAdc {
+                        skipped("the bring-up design sees no sheet")
+                    } else if lit.iter().any(|check| check.verdict() != Verdict::Passed) {
+                        skipped("needs sound LEDs")
+                    } else {
+                        let first = first_pixel::check(session, latency, settling);
+                        unless_refused(&stages[3..], first)?
+                    });
+                    lit
                 }
             });
         }

@@ -100,13 +100,6 @@ impl KeptFlatField {
             let leds = if dead.len() == 1 { "LED" } else { "LEDs" };
             text += &format!("; {} dead {leds} ({}{more})", dead.len(), named.join(", "));
         }
-        if self.flat.is_first_pixel_spoiled() {
-            text += &format!(
-                "; pixel (0, 0) reads {:.2} of white, which is what all patterns have in common and not its LED: its \
-                 neighbours take its place",
-                self.flat.first_pixel()
-            );
-        }
         text
     }
 

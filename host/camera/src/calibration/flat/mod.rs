@@ -30,9 +30,6 @@ use thiserror::Error;
 const PIXELS: usize = Side::INSTRUMENT.area();
 /// An LED with less than this share of the median light counts as dead.
 const DEAD_BELOW: f32 = 0.2;
-/// What all patterns have in common falls on pixel (0, 0). A reading of this pixel outside of the range, in units of white, is
-/// not the light of its LED: a dead LED reads 0.
-const OF_AN_LED: std::ops::RangeInclusive<f32> = -DEAD_BELOW..=2.0;
 /// A reading in the dark below this many standard deviations of noise counts as 0.
 const SIGMA: f32 = 4.0;
 
@@ -41,11 +38,8 @@ const SIGMA: f32 = 4.0;
 #[serde(try_from = "Frames", into = "Frames")]
 pub struct FlatField {
     frames: Frames,
-    /// Light of each LED divided by the mean of the live LEDs; 0 for a dead LED, and for pixel (0, 0) if it says nothing of
-    /// its LED.
+    /// Light of each LED divided by the mean of the live LEDs; 0 for a dead LED.
     gain: Vec<f32>,
-    /// What pixel (0, 0) reads before the white sheet, in units of the mean of the live LEDs.
-    first_pixel: f32,
 }
 
 /// The measured frames as kept in the file. Images are row-major, 32 x 32, in ADC counts.
@@ -118,19 +112,14 @@ impl TryFrom<Frames> for FlatField {
             return Err(FramesError::NotFilled { live: shining.len() });
         }
         let mean = shining.iter().sum::<f32>() / shining.len() as f32;
-        let mut gain: Vec<f32> =
+        let gain: Vec<f32> =
             light.iter().map(|&value| if live(value) { value / mean } else { 0.0 }).collect();
-        let first_pixel = light[0] / mean;
-        let is_spoiled = !OF_AN_LED.contains(&first_pixel);
-        if is_spoiled {
-            gain[0] = 0.0;
-        }
         let side = Side::INSTRUMENT.pixels();
         let dead_leds = (0..PIXELS)
-            .filter(|&at| gain[at] == 0.0 && !(is_spoiled && at == 0))
+            .filter(|&at| gain[at] == 0.0)
             .map(|at| [(at / side) as u8, (at % side) as u8])
             .collect();
-        Ok(Self { frames: Frames { dead_leds, ..frames }, gain, first_pixel })
+        Ok(Self { frames: Frames { dead_leds, ..frames }, gain })
     }
 }
 
@@ -180,20 +169,6 @@ impl FlatField {
         let reading = |&value: &f32| if value.abs() > SIGMA * noise { value } else { 0.0 };
         let dark_counts = Some(dark.pixels().iter().map(reading).collect());
         Frames { dark_counts, ..self.frames }.try_into()
-    }
-
-    /// What pixel (0, 0) reads before the white sheet; its neighbours read about 1. What is the same in all pairs of a
-    /// pattern and its complement falls on this one pixel: LEDs that rise unlike they fall, a supply that sags, charge from
-    /// the lines that switch.
-    #[must_use]
-    pub fn first_pixel(&self) -> f32 {
-        self.first_pixel
-    }
-
-    /// Whether pixel (0, 0) says nothing of its LED. Its neighbours then take its place, as that of a dead LED.
-    #[must_use]
-    pub fn is_first_pixel_spoiled(&self) -> bool {
-        !OF_AN_LED.contains(&self.first_pixel)
     }
 
     /// Light of each LED divided by the mean of the live LEDs, row-major; 0 where an image takes the mean of the neighbours.

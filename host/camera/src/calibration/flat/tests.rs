@@ -28,25 +28,6 @@ fn equal_reflectance_comes_out_equal_and_dead_leds_take_their_neighbours() {
 }
 
 #[test]
-fn a_pixel_that_holds_what_all_patterns_share_is_no_dead_led() {
-    for (reading, is_spoiled) in
-        [(-2.7, true), (-0.25, true), (-0.1, false), (1.9, false), (2.1, true)]
-    {
-        let white = image(|at| if at == 0 { reading * 500.0 } else { 500.0 });
-        let flat = FlatField::of_white(&white, 1.0).unwrap();
-        assert!((flat.first_pixel() - reading).abs() < 0.01, "{}", flat.first_pixel());
-        assert_eq!(flat.is_first_pixel_spoiled(), is_spoiled, "{reading}");
-        let is_dead = !is_spoiled && reading < DEAD_BELOW;
-        assert_eq!(flat.dead_leds().contains(&[0, 0]), is_dead, "{reading}");
-        let corner = flat.correct(&white).pixels()[0];
-        assert!((corner / 500.0 - 1.0).abs() < 0.01, "{corner}");
-    }
-    // Another pixel below zero is a dead LED.
-    let white = image(|at| if at == 40 { -1350.0 } else { 500.0 });
-    assert_eq!(FlatField::of_white(&white, 1.0).unwrap().dead_leds(), [[1, 8]]);
-}
-
-#[test]
 fn a_dark_frame_is_subtracted_where_it_is_more_than_noise() {
     let stray = |at: usize| if at == 100 { 50.0 } else { 0.0 };
     let white = image(|at| 500.0 * gains(at) + stray(at));
