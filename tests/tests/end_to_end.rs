@@ -4,16 +4,17 @@
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
+use nirspi::integrate::{Integrated, KnownOfRun};
 use nirspi::link::Link;
-use nirspi::recording::{Recording, Target, tally_recording};
+use nirspi::recording::{Recording, RecordingError, Target, frames_of_recording, tally_recording};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::signal::Signal;
 use nirspi::tally::Tally;
-use nirspi_optics::Scene;
+use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Order, Rows, Side, fwht, metrics, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
-use nirspi_virtual::{MemoryLink, VirtualCamera, VirtualOptics};
+use nirspi_virtual::{MemoryLink, VirtualCamera, VirtualOptics, calibrate_against_white};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::samples::Width;
 use nirspi_wire::{DeviceMessage, Fault, Frame, FrameFlags, Samples, encode, open, walsh};
@@ -256,6 +257,42 @@ fn a_recording_gives_the_same_tally_as_the_capture_that_made_it() {
     assert_eq!((account.asked, account.made), (Some(FRAMES), Some(u64::from(FRAMES))));
     assert_eq!(account.missing, captured.missing());
     assert!(account.missing.unwrap().contains("1 lost, 1 corrupt, 1 late"));
+}
+
+/// Each frame of one sweep holds what four sweeps cancel; the run's other frames tell what that is.
+#[test]
+fn a_frame_of_one_sweep_is_corrected_by_what_its_run_tells() {
+    let circuit =
+        "[leds]\npower_mw = 40\nrise_ns = 12.76\nfall_ns = 16.36\nline_crosstalk_ff = 1.6";
+    let optics =
+        VirtualOptics::of(&CameraModel::parse(circuit).unwrap(), Scene::white(), 300.0).unwrap();
+    let settling = calibrate_against_white(&optics, 1).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let options = CaptureOptions {
+        setup: optics.setup(&Order::ZigZag, 1.0).unwrap(),
+        frames: Some(32),
+        calibration: Calibration::Kept(settling),
+        record: Some(Target::New(path.clone())),
+    };
+    run(Box::new(MemoryLink::new(optics.camera(1).unwrap())), &options);
+    let mut recording = Recording::open(&path).unwrap();
+    let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
+    let fits = |_| Ok::<(), RecordingError>(());
+    let (frames, tally) = frames_of_recording(&mut recording, fits).unwrap();
+    let first_pixel = |frame: &Integrated| {
+        let measured = frame.measurements(&setup, settling.as_ref(), false).unwrap();
+        let image = reconstruct::hadamard(&measured);
+        image.pixels()[0] / image.pixels()[1..].iter().sum::<f32>() * 1023.0
+    };
+    let whole = first_pixel(tally.integrated());
+    assert!((whole - 1.0).abs() < 0.1, "{whole}");
+    for (at, frame) in frames.iter().enumerate() {
+        let corrected = first_pixel(frame);
+        assert!((corrected - 1.0).abs() < 0.4, "{at}: {corrected}");
+        let alone = first_pixel(&frame.clone().of_run(&KnownOfRun::default()));
+        assert!((alone - 1.0).abs() > 1.0, "{at}: {alone}");
+    }
 }
 
 #[test]

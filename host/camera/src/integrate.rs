@@ -1,14 +1,18 @@
 //! Makes measurements of frames: sums the frames of a run, corrects the settling leak, and assigns
 //! the rows.
 
+mod phases;
 mod spread;
 
 use crate::response::Settling;
 use crate::setup::MeasurementSetup;
 use nirspi_recon::{LeakError, MeasurementError, Measurements, Sweep};
 use nirspi_wire::{Frame, FrameFlags};
+pub(crate) use phases::Phases;
+use phases::{CYCLE, Offsets};
 use spread::Spread;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// The sum of the frames of one run, in ADC counts.
 #[derive(Debug, Clone)]
@@ -18,8 +22,18 @@ pub struct Integrated {
     sweeps: u64,
     flags: FrameFlags,
     spread: Spread,
-    /// The noise of a sweep, if other frames have told it.
-    known: Option<f64>,
+    /// Sweeps of the frames by the place of their first one in the cycle of sweeps that alternate.
+    places: [u64; CYCLE as usize],
+    known: KnownOfRun,
+}
+
+/// What the frames of a run tell together, and one of them alone does not.
+#[derive(Debug, Clone, Default)]
+pub struct KnownOfRun {
+    /// Standard deviation of the sum of one sweep.
+    pub noise_of_a_sweep: Option<f64>,
+    /// What does not cancel in frames of less than four sweeps.
+    pub(crate) offsets: Option<Arc<Offsets>>,
 }
 
 impl Integrated {
@@ -36,7 +50,8 @@ impl Integrated {
             sweeps: 0,
             flags: FrameFlags::default(),
             spread: Spread::default(),
-            known: None,
+            places: [0; _],
+            known: KnownOfRun::default(),
         }
     }
 
@@ -55,6 +70,7 @@ impl Integrated {
     /// Adds one frame that [fits](Self::fits).
     pub fn add(&mut self, frame: &Frame<'_>) {
         self.add_sums(frame.samples.iter(), u64::from(frame.sweeps));
+        self.places[phases::place_of(frame.sequence, frame.sweeps)] += u64::from(frame.sweeps);
         self.flags = self.flags.with(frame.flags);
     }
 
@@ -107,7 +123,12 @@ impl Integrated {
     pub fn means(&self, setup: &MeasurementSetup) -> Vec<f64> {
         let samples = self.sweeps as f64 * f64::from(setup.window());
         let scale = if samples > 0.0 { 1.0 / samples } else { 0.0 };
-        self.sums.iter().map(|&sum| sum as f64 * scale).collect()
+        let mut means: Vec<f64> = self.sums.iter().map(|&sum| sum as f64).collect();
+        if let Some(offsets) = &self.known.offsets {
+            offsets.correct(&mut means, self.places);
+        }
+        means.iter_mut().for_each(|mean| *mean *= scale);
+        means
     }
 
     /// Standard deviation of the noise of each of the [means](Self::means), in ADC counts, from what
@@ -122,14 +143,13 @@ impl Integrated {
     /// `None` for fewer than two frames.
     #[must_use]
     pub fn noise_of_a_sweep(&self) -> Option<f64> {
-        self.known.or_else(|| self.spread.of_a_sweep())
+        self.known.noise_of_a_sweep.or_else(|| self.spread.of_a_sweep())
     }
 
-    /// The same sum, with the [noise of a sweep](Self::noise_of_a_sweep) that all frames of its run show:
-    /// a frame alone tells none.
+    /// The same sum, with what all frames of its run tell.
     #[must_use]
-    pub fn with_noise_of_a_sweep(self, known: Option<f64>) -> Self {
-        Self { known, ..self }
+    pub fn of_run(self, known: &KnownOfRun) -> Self {
+        Self { known: known.clone(), ..self }
     }
 
     /// Measurements in ADC counts, with their [noise](Self::noise). With the camera's response, the dark level is subtracted from
@@ -191,18 +211,24 @@ pub struct Newest {
     total: Integrated,
     /// The frame before the oldest: one frame alone does not tell its noise.
     before: Option<Integrated>,
+    /// Frames of sweeps that alternate are kept in whole cycles.
+    alternating: bool,
 }
 
 impl Newest {
     /// A sum without frames.
     #[must_use]
     pub fn new(setup: &MeasurementSetup) -> Self {
-        Self { frames: VecDeque::new(), total: Integrated::new(setup), before: None }
+        let alternating = setup.differential && setup.alternating;
+        Self { frames: VecDeque::new(), total: Integrated::new(setup), before: None, alternating }
     }
 
     /// Adds a frame that [fits](Integrated::fits), and keeps only the newest `most` frames, at
-    /// least one.
+    /// least one. From four on, a number that is no multiple of four is rounded down where the faults of LEDs and
+    /// lines cancel in four sweeps.
     pub fn push(&mut self, frame: &Frame<'_>, most: usize) {
+        let cycle = CYCLE as usize;
+        let most = if self.alternating && most > cycle { most - most % cycle } else { most };
         while self.frames.len() >= most.max(1) {
             let Some(oldest) = self.frames.pop_front() else { break };
             for (total, sum) in self.total.sums.iter_mut().zip(&oldest.sums) {
@@ -272,7 +298,8 @@ mod tests {
         }
         with_frame(&[100, 20, -7, 3], FrameFlags::default(), |frame| alone.add(frame));
         assert_eq!(alone.noise(&setup), None);
-        let alone = alone.with_noise_of_a_sweep(run.noise_of_a_sweep());
+        let noise_of_a_sweep = run.noise_of_a_sweep();
+        let alone = alone.of_run(&KnownOfRun { noise_of_a_sweep, offsets: None });
         let (of_run, of_one) = (run.noise(&setup).unwrap(), alone.noise(&setup).unwrap());
         assert!((of_one / of_run - 3.0_f64.sqrt()).abs() < 1e-9, "{of_one} {of_run}");
         // A live view of one frame looks at the frame before.
@@ -291,7 +318,7 @@ mod tests {
             for (at, (values, over, most)) in frames.iter().enumerate() {
                 let before = newest.frames.len();
                 with_frame(values, flag(*over), |frame| newest.push(frame, *most));
-                let kept = (before + 1).min(*most);
+                let kept = (before + 1).min(if *most == 5 { 4 } else { *most });
                 let mut expected = Integrated::new(&setup);
                 for (values, over, _) in &frames[at + 1 - kept..=at] {
                     with_frame(values, flag(*over), |frame| expected.add(frame));

@@ -4,9 +4,10 @@
 //! A recording gives the same tally as the capture that made it.
 
 use crate::account::{Arrival, Check, LossAccount};
-use crate::integrate::Integrated;
+use crate::integrate::{Integrated, KnownOfRun, Phases};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// The sum and the account of a run's packets.
@@ -17,6 +18,8 @@ pub struct Tally {
     differential: bool,
     account: LossAccount,
     integrated: Integrated,
+    /// Of sweeps that alternate.
+    phases: Option<Phases>,
     /// How the first invalid frame contradicts the setup.
     misfit: Option<Misfit>,
     /// The number of frames that the camera reported at the end of the run.
@@ -66,6 +69,7 @@ impl Tally {
             differential: setup.differential,
             account: LossAccount::new(),
             integrated: Integrated::new(setup),
+            phases: (setup.differential && setup.alternating).then(Phases::default),
             misfit: None,
             said: None,
             device_time_us: 0,
@@ -117,6 +121,9 @@ impl Tally {
         let received = self.account.frame(frame.sequence) == Arrival::Received;
         if received {
             self.integrated.add(frame);
+            if let Some(phases) = &mut self.phases {
+                phases.add(frame.sequence, frame.sweeps, frame.samples.iter());
+            }
         }
         received
     }
@@ -196,5 +203,14 @@ impl Tally {
     #[must_use]
     pub fn integrated(&self) -> &Integrated {
         &self.integrated
+    }
+
+    /// What the frames tell together, for the measurements of each of them.
+    #[must_use]
+    pub fn known(&self) -> KnownOfRun {
+        let noise_of_a_sweep = self.integrated.noise_of_a_sweep();
+        let offsets = self.phases.as_ref().zip(noise_of_a_sweep);
+        let offsets = offsets.and_then(|(phases, noise)| phases.offsets(noise)).map(Arc::new);
+        KnownOfRun { noise_of_a_sweep, offsets }
     }
 }

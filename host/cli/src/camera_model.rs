@@ -71,7 +71,8 @@ fn say(report: &Report) -> Result<()> {
     }
     if report.first_pixel_off.abs() >= 0.005 {
         print::line(format_args!(
-            "LEDs: rise and fall differ, so pixel (0, 0) of a white sheet reads {:.2} of white (all patterns)",
+            "LEDs: rise and fall differ. Pixel (0, 0) of a white sheet would read {:.2} of white if the pattern came first in \
+             every pair; sweeps that alternate cancel this",
             1.0 + report.first_pixel_off
         ))?;
     }

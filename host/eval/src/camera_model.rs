@@ -34,8 +34,8 @@ pub struct Report {
     pub amplifier_noise_pa_per_sqrt_hz: f64,
     /// Gain-bandwidth product that the amplifier needs.
     pub gain_bandwidth_ghz: f64,
-    /// What pixel (0, 0) of a white sheet is off by in the image of all patterns, in units of white, because the LEDs rise
-    /// unlike they fall.
+    /// What pixel (0, 0) of a white sheet would be off by in the image of all patterns, in units of white, because the LEDs
+    /// rise unlike they fall, if sweeps did not alternate.
     pub first_pixel_off: f64,
     /// The camera at some distances.
     pub distances: Vec<AtDistance>,

@@ -131,7 +131,7 @@ fn each(
     let method = Stacked::new(method);
     let image = |sum: Integrated, frame: usize| -> Result<Shown, ExportError> {
         let measurements = sum
-            .with_noise_of_a_sweep(whole.noise_of_a_sweep)
+            .of_run(&whole.known)
             .measurements(&setup, settling.as_ref(), whole.keep_leak)
             .map_err(|problem| whole.integrate(problem))?;
         let made = method.reconstruct(&measurements).map_err(problem(frame))?;

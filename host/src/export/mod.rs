@@ -16,7 +16,7 @@ mod video;
 
 use crate::files::FileError;
 use crate::files::output::Existing;
-use crate::integrate::{IntegrateError, Integrated};
+use crate::integrate::{IntegrateError, Integrated, KnownOfRun};
 use crate::provenance::Made;
 use crate::recording::{Recording, RecordingError, hear_recording};
 use crate::setup::MeasurementSetup;
@@ -266,8 +266,8 @@ struct Whole {
     setup: MeasurementSetup,
     /// The mean of all frames.
     source: Source,
-    /// Standard deviation of the sum of one sweep, by all frames.
-    noise_of_a_sweep: Option<f64>,
+    /// What all frames tell of each.
+    known: KnownOfRun,
     sequence: Vec<i64>,
     device_time_us: Vec<i64>,
     time_ns: Vec<i64>,
@@ -291,7 +291,7 @@ impl Whole {
             keep_leak: options.keep_leak,
             setup: recording.setup.clone(),
             source: source::of_sum(path, options, &recording, &tally)?,
-            noise_of_a_sweep: tally.integrated().noise_of_a_sweep(),
+            known: tally.known(),
             sequence,
             device_time_us,
             time_ns,
@@ -321,7 +321,7 @@ impl Whole {
                 return Err(ExportError::Changed(self.path.clone()));
             }
             let measurements = alone(frame, &setup)
-                .with_noise_of_a_sweep(self.noise_of_a_sweep)
+                .of_run(&self.known)
                 .measurements(&setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
             on(index, &measurements)?;

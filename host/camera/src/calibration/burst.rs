@@ -237,13 +237,12 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
     let period = 2 * half;
     let MeanPeriod { counts: mean, periods: count, noise_counts } = MeanPeriod::of(samples);
 
-    // The response is periodic, so its extremes are the settled levels at any latency.
-    let settled = 16;
-    let level = |from: usize| -> f64 {
-        (0..settled).map(|n| mean[(from + n) % period]).sum::<f64>() / settled as f64
-    };
-    let high = (0..period).map(level).fold(f64::NEG_INFINITY, f64::max);
-    let low = (0..period).map(level).fold(f64::INFINITY, f64::min);
+    // The light is on for half of the time, so the median of each half, the brighter and the darker, is a settled
+    // level at any latency. A charge that drives the ADC to the end of its range does not move a median.
+    let mut sorted = mean.clone();
+    sorted.sort_by(f64::total_cmp);
+    let (darker, brighter) = sorted.split_at(half);
+    let (low, high) = (middle(darker), middle(brighter));
     let step_counts = high - low;
     let noise_of_mean = (noise_counts / count.sqrt()).max(0.5 / count.sqrt());
     if step_counts < MIN_STEP_TO_NOISE * noise_of_mean {
@@ -276,6 +275,12 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
     Ok(Settling { adc_latency, response, dark_counts: low, step_counts, noise_counts })
 }
 
+/// The median of sorted values.
+fn middle(sorted: &[f64]) -> f64 {
+    let at = |index: usize| sorted.get(index).copied().unwrap_or(0.0);
+    f64::midpoint(at(sorted.len() / 2), at(sorted.len().saturating_sub(1) / 2))
+}
+
 impl Settling {
     /// The same latency and response, with dark level, step and noise of these samples.
     fn at_levels_of(&self, samples: &[f64]) -> Self {
@@ -285,7 +290,9 @@ impl Settling {
         let settled = self.response.len().min(half - 1);
         let level = |step: usize| {
             let at = |n: usize| counts[(usize::from(self.adc_latency) + step + n) % counts.len()];
-            (settled..half).map(at).sum::<f64>() / (half - settled) as f64
+            let mut sorted: Vec<f64> = (settled..half).map(at).collect();
+            sorted.sort_by(f64::total_cmp);
+            middle(&sorted)
         };
         let (on, off) = (level(0), level(half));
         Self { dark_counts: off, step_counts: on - off, noise_counts, ..self.clone() }
@@ -361,6 +368,17 @@ mod tests {
         let (found, expected) = (evaluate(&charged).unwrap(), evaluate(&clean).unwrap());
         assert_eq!(found.adc_latency, 7);
         assert!((found.response[0] - expected.response[0]).abs() < 1e-9, "{:?}", found.response);
+        // A charge beyond the ADC's range spoils the first samples after a change of the lines, and no more.
+        for (charged, clean) in charged.iter_mut().zip(&clean) {
+            *charged =
+                (clean + 10.0 * (*charged - clean)).clamp(0.0, f64::from(nirspi_wire::ADC_MAX));
+        }
+        let found = evaluate(&charged).unwrap();
+        assert_eq!(found.adc_latency, 7);
+        assert!((found.step_counts - 9000.0).abs() < 1.0, "{}", found.step_counts);
+        assert!((found.response[6] - expected.response[6]).abs() < 0.01, "{:?}", found.response);
+        let dim = expected.at_levels_of(&charged);
+        assert!((dim.step_counts - 9000.0).abs() < 1.0, "{}", dim.step_counts);
     }
 
     #[test]

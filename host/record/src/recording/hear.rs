@@ -60,7 +60,7 @@ pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingErro
     hear_recording(recording, |_, _| Ok(()))
 }
 
-/// The sum of each frame that arrived in order, with the noise that all of them show, and the account of all frames of the recording. `fits`
+/// The sum of each frame that arrived in order, with what all of them tell of it, and the account of all frames of the recording. `fits`
 /// is asked for each number of frames before they are kept.
 ///
 /// # Errors
@@ -80,7 +80,6 @@ pub fn frames_of_recording<E: From<RecordingError>>(
         }
         Ok::<(), E>(())
     })?;
-    let noise = tally.integrated().noise_of_a_sweep();
-    let known = |frame: Integrated| frame.with_noise_of_a_sweep(noise);
-    Ok((frames.into_iter().map(known).collect(), tally))
+    let known = tally.known();
+    Ok((frames.into_iter().map(|frame| frame.of_run(&known)).collect(), tally))
 }
