@@ -9,6 +9,7 @@ use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
+use nirspi_optics::Motion;
 use nirspi_optics::rain::{Air, Rainfall};
 use nirspi_recon::{Order, Sampling};
 use nirspi_virtual::weather::{WeatherError, read_weather};
@@ -81,6 +82,8 @@ pub struct SceneArgs {
     #[command(flatten)]
     pub weather: WeatherArgs,
     #[command(flatten)]
+    pub motion: MotionArgs,
+    #[command(flatten)]
     pub model: ModelArgs,
     /// Seed of the simulated noise: the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -128,6 +131,41 @@ impl WeatherArgs {
     }
 }
 
+/// How the target moves.
+#[derive(Debug, Clone, Default, Args)]
+pub struct MotionArgs {
+    /// Speed of the target across the field, in metres a second. It leaves the field and comes again from the other side
+    #[arg(long, value_name = "M_PER_S", default_value_t = 0.0)]
+    pub target_speed: f64,
+    /// Where the target goes: 0 is to the right, 90 down
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        requires = "target_speed",
+        allow_negative_numbers = true
+    )]
+    pub target_direction: f64,
+    /// Degrees a second by which the target turns, clockwise
+    #[arg(
+        long,
+        value_name = "DEGREES_PER_S",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub target_turning: f64,
+}
+
+impl MotionArgs {
+    fn motion(&self) -> Motion {
+        Motion {
+            speed_m_per_s: self.target_speed,
+            direction_deg: self.target_direction,
+            turning_deg_per_s: self.target_turning,
+        }
+    }
+}
+
 /// The paper's rain (Table 2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -165,7 +203,8 @@ impl SceneArgs {
     fn sheet(scene: &str, model: &ModelArgs, seed: u64) -> Self {
         let (scene, model) = (scene.to_owned(), model.clone());
         let weather = WeatherArgs { weather: None };
-        Self { scene, distance_m: None, rain: Some(Rain::None), weather, model, seed }
+        let motion = MotionArgs::default();
+        Self { scene, distance_m: None, rain: Some(Rain::None), weather, motion, model, seed }
     }
 
     /// The weather in front of this camera.
@@ -193,6 +232,7 @@ impl SceneArgs {
         let distance_m = distance_mm / 1e3;
         let optics = VirtualOptics::before(&model, &map, distance_mm)
             .map_err(|error| Usage(format!("--distance-m {distance_m}: {error}")))?;
+        let optics = optics.moving(self.motion.motion()).map_err(|e| Usage(e.to_string()))?;
         let air = self.air(&model)?;
         let optics = optics
             .in_air(&air)

@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | [`scene`] | a picture | reflectance on a target plane, in millimetres |
 //! | [`projector`] | scene and distance | [`Footprint`]: the reflectance that each LED's spot sees |
+//! | [`motion`] | scene and time | what each LED's spot sees of a target that moves |
 //! | [`relief`] | a picture and the distance of each pixel | the light of each LED, with the defocus of each distance |
 //! | [`budget`] | watts, apertures, distance | electrons per ADC sample for one LED, and for daylight |
 //! | [`mod@array`] | 32 row and 32 column lines | electrons per ADC sample for the LEDs they light |
@@ -43,6 +44,7 @@ pub mod edges;
 pub mod instrument;
 pub mod lamp;
 pub mod mie;
+pub mod motion;
 pub mod pixel;
 mod poles;
 pub mod projector;
@@ -63,6 +65,7 @@ pub use chain::{AdcSample, Chain, ChainError, ChainSettings};
 pub use depth::{DEPTH_SIDE, DepthError, DepthGeometry, DepthView, SimulatedDepth};
 pub use edges::{LedEdges, Light};
 pub use instrument::{LEDS, SIDE, WAVELENGTH_NM};
+pub use motion::{Motion, MotionError, MovingTarget, Pose};
 pub use projector::{Footprint, Projector, ProjectorError};
 pub use relief::{Relief, ReliefError};
 pub use scene::{Scene, SceneError};

@@ -180,25 +180,37 @@ impl Projector {
     /// [`ProjectorError`] if a setting or the distance is not physical, or if the target is so far
     /// out of focus that no pattern remains.
     pub fn footprint(&self, scene: &Scene, distance_mm: f64) -> Result<Footprint, ProjectorError> {
+        let step_mm = self.grid_mm(distance_mm)?;
+        let radius = self.blur_mm(distance_mm) / 2.0 / step_mm;
+        let emitter_mm = self.emitter_mm / self.led_pitch_mm * SAMPLES_PER_PITCH as f64 * step_mm;
+        // A point on every LED's axis, and a margin for the disc.
+        let margin = radius.ceil() as usize + 1;
+        let points = (SIDE - 1) * SAMPLES_PER_PITCH + 1 + 2 * margin;
+        let sharp = SharpGrid::new(scene, step_mm, emitter_mm, points);
+        let at = |led: usize| margin + led * SAMPLES_PER_PITCH;
+        let mut weights = Vec::with_capacity(LEDS);
+        for row in 0..SIDE {
+            for column in 0..SIDE {
+                // Differences of running sums may leave the range by the last bit.
+                let mean = sharp.mean_over_disc(at(row), at(column), radius);
+                weights.push(mean.clamp(0.0, 1.0) as f32);
+            }
+        }
+        Ok(Footprint { weights })
+    }
+
+    /// Distance of the points of the grid on which spots are integrated at `distance_mm`.
+    ///
+    /// # Errors
+    /// As [`Projector::footprint`].
+    pub(crate) fn grid_mm(&self, distance_mm: f64) -> Result<f64, ProjectorError> {
         self.validate()?;
         positive("distance_mm", distance_mm)?;
         let (field_mm, blur_mm) = (self.field_mm(distance_mm), self.blur_mm(distance_mm));
         if blur_mm > MAX_BLUR_FIELDS * field_mm {
             return Err(ProjectorError::WashedOut { distance_mm, blur_mm, field_mm });
         }
-
-        let step_mm = field_mm / (SIDE * SAMPLES_PER_PITCH) as f64;
-        let radius = blur_mm / 2.0 / step_mm;
-        let sharp = SharpGrid::new(scene, step_mm, self.emitter_mm / self.led_pitch_mm, radius);
-        let mut weights = Vec::with_capacity(LEDS);
-        for row in 0..SIDE {
-            for column in 0..SIDE {
-                // Differences of running sums may leave the range by the last bit.
-                let mean = sharp.mean_over_disc(row, column, radius);
-                weights.push(mean.clamp(0.0, 1.0) as f32);
-            }
-        }
-        Ok(Footprint { weights })
+        Ok(field_mm / (SIDE * SAMPLES_PER_PITCH) as f64)
     }
 }
 
@@ -220,20 +232,16 @@ fn positive(name: &'static str, value_mm: f64) -> Result<(), ProjectorError> {
     }
 }
 
-/// The scene seen through one sharp emitter, sampled on a grid of [`SAMPLES_PER_PITCH`] points per
-/// pitch with a point on every LED's axis. Stored as running sums along rows, so that each row of a
-/// disc is one difference.
-struct SharpGrid {
+/// The scene seen through one sharp emitter, sampled on a grid of points around its centre. Stored as running
+/// sums along rows, so that each row of a disc is one difference.
+pub(crate) struct SharpGrid {
     running: Vec<f64>,
     stride: usize,
-    margin: usize,
 }
 
 impl SharpGrid {
-    fn new(scene: &Scene, step_mm: f64, fill: f64, radius: f64) -> Self {
-        let margin = radius.ceil() as usize + 1;
-        let points = (SIDE - 1) * SAMPLES_PER_PITCH + 1 + 2 * margin;
-        let emitter_mm = fill * SAMPLES_PER_PITCH as f64 * step_mm;
+    /// `points` x `points`, `step_mm` apart.
+    pub(crate) fn new(scene: &Scene, step_mm: f64, emitter_mm: f64, points: usize) -> Self {
         let at_mm = |i: usize| (i as f64 - (points - 1) as f64 / 2.0) * step_mm;
         let stride = points + 1;
         let mut running = vec![0.0; points * stride];
@@ -244,13 +252,12 @@ impl SharpGrid {
                 sums[column + 1] = sum;
             }
         }
-        Self { running, stride, margin }
+        Self { running, stride }
     }
 
-    /// Mean over the disc of `radius` grid steps around LED (`row`, `column`).
-    fn mean_over_disc(&self, row: usize, column: usize, radius: f64) -> f64 {
-        let x = (self.margin + column * SAMPLES_PER_PITCH) as f64 + 0.5;
-        let y = self.margin + row * SAMPLES_PER_PITCH;
+    /// Mean over the disc of `radius` grid steps around the point (`y`, `column`), at least as far from the edge.
+    pub(crate) fn mean_over_disc(&self, y: usize, column: usize, radius: f64) -> f64 {
+        let x = column as f64 + 0.5;
         if radius < 0.5 {
             // A disc smaller than the grid is hidden by the emitter's own width.
             return self.sum_to(y, x + 0.5) - self.sum_to(y, x - 0.5);

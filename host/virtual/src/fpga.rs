@@ -3,13 +3,17 @@
 use nirspi_hdl_model::{AdcSample, Gateware, Lines};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::rain::RainySpots;
-use nirspi_optics::{Chain, LedArray};
+use nirspi_optics::{Chain, LedArray, MovingTarget};
 use nirspi_wire::register::{BRING_UP_HZ, Design, loopback};
 use std::collections::VecDeque;
 
 /// ADC clocks between two updates of the drops: one differential sweep, in which a 2 mm drop falls
 /// half a millimetre.
 const WEATHER_CLOCKS: u64 = 10_240;
+/// The most that a target moves between two updates, in pixels.
+const STEP_PX: f64 = 0.02;
+/// The fewest ADC clocks between two updates.
+const LEAST_CLOCKS: u64 = 64;
 
 /// An FPGA whose time the virtual camera advances.
 pub trait SimulatedFpga: FpgaBus + Send {
@@ -33,7 +37,9 @@ pub struct OpticalFpga {
     detector: Detector,
     wiring: Option<Wiring>,
     clock: u64,
-    rain: Option<Rain>,
+    front: Option<Front>,
+    /// The clock of the last update of what changes in front of the array.
+    updated: u64,
     /// The levels at the LED pins in the last clocks, of a bring-up design.
     loopback: Option<VecDeque<Lines>>,
 }
@@ -122,12 +128,40 @@ fn word(sample: nirspi_optics::AdcSample) -> AdcSample {
 /// registers on the way out, one on the way in, four of `loopback`.
 const LOOPBACK_CLOCKS: usize = 7;
 
-/// Rain between the array and the scene.
-struct Rain {
-    spots: RainySpots,
-    electrons_per_led: f64,
-    /// The clock of the last update of the drops.
-    seen: u64,
+/// What changes in front of the array: rain, a target that moves, or both.
+pub struct Front {
+    /// Rain between array and target.
+    pub rain: Option<RainySpots>,
+    /// A target that moves.
+    pub target: Option<MovingTarget>,
+    /// Electrons a sample of an LED on a white target in dry air.
+    pub electrons_per_led: f64,
+}
+
+impl Front {
+    /// ADC clocks between two updates.
+    fn clocks(&self) -> u64 {
+        let target = self.target.as_ref().map_or(u64::MAX, |target| {
+            let clocks = target.seconds_for(STEP_PX) * f64::from(nirspi_wire::ADC_HZ);
+            (clocks as u64).max(LEAST_CLOCKS)
+        });
+        target.min(WEATHER_CLOCKS)
+    }
+
+    /// The reflectances that the spots see, `passed` seconds after the last call and `now` seconds after the start.
+    fn reflectance(&mut self, passed: f64, now: f64) -> Vec<f32> {
+        let seen = self.target.as_ref().map(|target| target.seen(now));
+        match (&mut self.rain, seen) {
+            (Some(rain), seen) => {
+                if let Some(seen) = seen {
+                    rain.look_at(seen);
+                }
+                rain.advance(passed);
+                rain.reflectance()
+            }
+            (None, seen) => seen.unwrap_or_default(),
+        }
+    }
 }
 
 impl OpticalFpga {
@@ -135,8 +169,8 @@ impl OpticalFpga {
     #[must_use]
     pub fn new(array: LedArray, chain: Chain) -> Self {
         let detector = Detector::new(array, chain);
-        let (wiring, rain, loopback) = (None, None, None);
-        Self { detector, wiring, clock: 0, rain, loopback }
+        let (wiring, front, loopback) = (None, None, None);
+        Self { detector, wiring, clock: 0, front, updated: 0, loopback }
     }
 
     /// The bring-up design on the same boards: neither ADC nor LEDs.
@@ -147,7 +181,7 @@ impl OpticalFpga {
         gateware.set_interlock(true);
         let loopback = Some(VecDeque::from([Lines::default(); LOOPBACK_CLOCKS]));
         let detector = Detector { gateware, ..self.detector };
-        Self { detector, loopback, rain: None, ..self }
+        Self { detector, loopback, front: None, ..self }
     }
 
     /// Loses everything, as after a dip of the supply: registers, frames, LEDs off. The clock starts again at 0
@@ -212,30 +246,28 @@ impl OpticalFpga {
         Self { wiring: Some(Box::new(wiring)), ..self }
     }
 
-    /// The same camera with rain in front of it. In dry air, an LED on a white target gives
-    /// `electrons_per_led`.
+    /// The same camera with something in front of it that changes.
     #[must_use]
-    pub fn in_rain(mut self, spots: RainySpots, electrons_per_led: f64) -> Self {
-        let reflectance = spots.reflectance();
-        self.detector.relight(&reflectance, electrons_per_led);
-        self.rain = Some(Rain { spots, electrons_per_led, seen: 0 });
+    pub fn behind(mut self, mut front: Front) -> Self {
+        self.detector.relight(&front.reflectance(0.0, 0.0), front.electrons_per_led);
+        self.front = Some(front);
         self
     }
 
-    /// Updates the positions of the drops if the last update is long ago. Returns the clocks until the next update; outside a
-    /// run, and in dry air, nothing is to be updated.
-    fn look_at_the_rain(&mut self) -> u64 {
+    /// Updates what changes in front of the array if the last update is long ago. Returns the clocks until the next update;
+    /// outside a run, and before a target at rest in dry air, nothing is to be updated.
+    fn look_in_front(&mut self) -> u64 {
         let (now, running) = (self.clock, self.running());
-        let Some(rain) = self.rain.as_mut().filter(|_| running) else { return u64::MAX };
-        let passed = now - rain.seen;
-        if passed < WEATHER_CLOCKS {
-            return WEATHER_CLOCKS - passed;
+        let Some(front) = self.front.as_mut().filter(|_| running) else { return u64::MAX };
+        let (passed, clocks) = (now - self.updated, front.clocks());
+        if passed < clocks {
+            return clocks - passed;
         }
-        rain.spots.advance(passed as f64 / f64::from(nirspi_wire::ADC_HZ));
-        rain.seen = now;
-        let (reflectance, electrons_per_led) = (rain.spots.reflectance(), rain.electrons_per_led);
-        self.detector.relight(&reflectance, electrons_per_led);
-        WEATHER_CLOCKS
+        let seconds = |clocks: u64| clocks as f64 / f64::from(nirspi_wire::ADC_HZ);
+        let reflectance = front.reflectance(seconds(passed), seconds(now));
+        self.detector.relight(&reflectance, front.electrons_per_led);
+        self.updated = now;
+        clocks
     }
 }
 
@@ -248,7 +280,7 @@ impl SimulatedFpga for OpticalFpga {
         // A camera without these needs none of their checks in each clock: docs/performance.md has its speed.
         let plain = self.wiring.is_none() && self.loopback.is_none();
         while self.clock < end {
-            let stretch = self.look_at_the_rain().min(end - self.clock);
+            let stretch = self.look_in_front().min(end - self.clock);
             if plain {
                 self.detector.advance(stretch);
             } else {

@@ -28,7 +28,7 @@ mod stages;
 mod tunnel;
 pub mod weather;
 
-pub use fpga::{OpticalFpga, SimulatedFpga, Wiring};
+pub use fpga::{Front, OpticalFpga, SimulatedFpga, Wiring};
 pub use link::MemoryLink;
 pub use look::{Bench, Calibrated, Look, LookError, Seen, SeenImage, SeenPicture};
 pub use model::{CameraFileError, read_camera_model};

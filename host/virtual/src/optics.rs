@@ -1,13 +1,14 @@
 //! The optics of the virtual camera: scene, projector, photon budget, receiver.
 
-use super::{OpticalFpga, VirtualCamera};
+use super::{Front, OpticalFpga, VirtualCamera};
 use nirspi::scene::SceneMap;
 use nirspi::setup::MeasurementSetup;
 use nirspi_optics::camera::{canonical, fnv1a};
 use nirspi_optics::rain::{Air, BeamShadows, RainError, RainySpots, Weather};
 use nirspi_optics::{
     Budget, BudgetError, CameraModel, Chain, ChainError, ChainSettings, DepthError, DepthView,
-    Footprint, LedArray, Projector, ProjectorError, Scene, SceneError, SimulatedDepth,
+    Footprint, LedArray, Motion, MotionError, MovingTarget, Projector, ProjectorError, Scene,
+    SceneError, SimulatedDepth,
 };
 use nirspi_recon::{Order, RowsError};
 use thiserror::Error;
@@ -22,6 +23,7 @@ pub struct VirtualOptics {
     budget: Budget,
     chain: ChainSettings,
     weather: Option<Weather>,
+    motion: Motion,
 }
 
 /// Why optics cannot be built.
@@ -43,6 +45,9 @@ pub enum VirtualOpticsError {
     /// A reflectance is out of range.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The target's motion is out of range.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
     /// The weather is out of range.
     #[error(transparent)]
     Rain(#[from] RainError),
@@ -85,7 +90,8 @@ impl VirtualOptics {
         chain.electrons_per_count = chain.auto_gain(&budget)?;
         chain.ambient_electrons = budget.ambient_electrons(footprint.mean());
         let camera = camera.clone();
-        Ok(Self { camera, scene, distance_mm, footprint, budget, chain, weather: None })
+        let (weather, motion) = (None, Motion::default());
+        Ok(Self { camera, scene, distance_mm, footprint, budget, chain, weather, motion })
     }
 
     /// This camera in front of a scene by name or file. The target has its own size, or fills the
@@ -192,6 +198,27 @@ impl VirtualOptics {
             return format!("virtual-{seed}");
         }
         format!("virtual-{seed}-{:08x}", fnv1a(this.as_bytes()))
+    }
+
+    /// Sets the target in motion. White sheets stay where they are.
+    ///
+    /// # Errors
+    /// [`VirtualOpticsError`] for a motion out of range.
+    pub fn moving(self, motion: Motion) -> Result<Self, VirtualOpticsError> {
+        motion.validate()?;
+        Ok(Self { motion, ..self })
+    }
+
+    /// The target, if it moves.
+    ///
+    /// # Errors
+    /// Does not occur for optics that could be built, because scene and distance are the same.
+    pub fn moving_target(&self) -> Result<Option<MovingTarget>, ProjectorError> {
+        if self.motion.is_none() {
+            return Ok(None);
+        }
+        let projector = self.camera.projector();
+        MovingTarget::new(self.motion, &projector, &self.scene, self.distance_mm).map(Some)
     }
 
     /// Puts weather between camera and scene. Daylight is dimmed and scattered by the average
@@ -350,10 +377,12 @@ impl VirtualOptics {
     /// [`VirtualOpticsError`] for a receiver setting out of range.
     pub fn fpga(&self, seed: u64) -> Result<OpticalFpga, VirtualOpticsError> {
         let fpga = OpticalFpga::new(self.led_array(), Chain::new(self.chain, seed)?);
-        Ok(match self.spots(seed)? {
-            Some(spots) => fpga.in_rain(spots, self.budget.electrons_per_led),
-            None => fpga,
-        })
+        let (rain, target) = (self.spots(seed)?, self.moving_target()?);
+        if rain.is_none() && target.is_none() {
+            return Ok(fpga);
+        }
+        let electrons_per_led = self.budget.electrons_per_led;
+        Ok(fpga.behind(Front { rain, target, electrons_per_led }))
     }
 
     /// The time-of-flight sensor next to the camera.

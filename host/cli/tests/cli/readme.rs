@@ -43,7 +43,6 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/mutants.md", "cargo mutants", "hours; .ci/run mutants"),
     ("docs/performance.md", "host/scripts/live_speed.py", "a minute, on a quiet machine"),
     ("docs/performance.md", "host/gpu/benches/gpu.sh", "needs a GPU"),
-    ("docs/physics.md", "white.mcap", "a camera of the repository; host/virtual/tests/edges.rs"),
     ("docs/quality.md", "eval quality", "needs data of other groups; tests/cli/quality.rs"),
     ("docs/quality.md", "eval table", "minutes; tests/cli/rain.rs has fewer scenes"),
     ("docs/quality.md", "metrics sharp.npy", "the user's stacks; tests/cli/metrics.rs"),

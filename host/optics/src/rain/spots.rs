@@ -62,6 +62,12 @@ impl RainySpots {
         })
     }
 
+    /// Another target in the same place, or the same after it has moved: the mean reflectance that each spot sees in dry
+    /// air. The light scattered from its surroundings stays that of the first target.
+    pub fn look_at(&mut self, seen: Vec<f32>) {
+        self.dry = seen;
+    }
+
     /// Advances the time.
     pub fn advance(&mut self, seconds: f64) {
         if let Some(falling) = &mut self.falling {
