@@ -50,7 +50,7 @@ pub struct Args {
     /// for each pattern, or pattern and complement side by side, (M, 2); --readings names other forms. --strength is relative
     /// to the variance of the readings
     #[arg(long, value_name = "FILE", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed", "shown", "side",
-          "keep_leak", "warm_start"])]
+          "keep_leak", "warm_start", "complements_first", "inverted", "shift", "sweeps"])]
     matrix: Option<PathBuf>,
     /// With --matrix: height and width of the image, such as 12x15, if patterns are rows and the image is no square
     #[arg(long, value_name = "HxW", requires = "matrix")]

@@ -5,7 +5,7 @@ use super::camera::parse_order;
 use super::report::words;
 use anyhow::Result;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use nirspi::files::measurement::{Form, Selection};
+use nirspi::files::measurement::{Form, Remedy, Selection};
 use nirspi::provenance::Taken;
 use nirspi::source::{Index, Part, Source, SourceError, SourceOptions};
 use nirspi_recon::{Measurements, Order, Side};
@@ -45,6 +45,24 @@ pub struct SourceArgs {
     /// Every comma in a text file is a decimal comma
     #[arg(long)]
     pub decimal_comma: bool,
+    /// Each complement comes before its pattern
+    #[arg(long)]
+    pub complements_first: bool,
+    /// All readings have the other sign, as behind an inverting amplifier
+    #[arg(long)]
+    pub inverted: bool,
+    /// So many readings of the sweep are missing in front of those of the file; if negative, so many came before the sweep
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 0,
+        allow_negative_numbers = true,
+        hide_default_value = true
+    )]
+    pub shift: i32,
+    /// The file holds so many sweeps of the same patterns, one after another, and no h_row. Their mean is used
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    pub sweeps: Option<u32>,
     /// Which part of complex readings to show
     #[arg(long, value_name = "PART", default_value = Part::Magnitude.name(), value_parser = parts())]
     pub part: Part,
@@ -82,6 +100,12 @@ impl SourceArgs {
             shown,
             transpose: self.transpose,
             decimal_comma: self.decimal_comma,
+            remedy: Remedy {
+                complements_first: self.complements_first,
+                inverted: self.inverted,
+                shift: self.shift,
+                sweeps: self.sweeps.unwrap_or(0),
+            },
         })
     }
 

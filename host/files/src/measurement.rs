@@ -38,6 +38,7 @@ mod patterns;
 mod plain;
 mod readings;
 mod reference;
+mod remedy;
 mod rows;
 mod sides;
 mod stack;
@@ -52,6 +53,7 @@ use opened::Opened;
 pub use patterns::{PatternSelection, Patterns};
 pub use plain::{Plain, read_plain};
 use rayon::prelude::*;
+pub use remedy::Remedy;
 pub use stack::Stack;
 use std::path::Path;
 pub use write::{NOISE, PROVENANCE, encode, write_readings};
@@ -77,6 +79,8 @@ pub struct Selection {
     pub transpose: bool,
     /// Whether every comma of a text file is a decimal comma.
     pub decimal_comma: bool,
+    /// What must be done with the readings.
+    pub remedy: Remedy,
 }
 
 /// The detector's readings, in volts, counts or any other logged unit.
@@ -120,6 +124,8 @@ pub struct MeasurementFile {
     pub overloads: Vec<usize>,
     /// What the readings are said to be.
     pub claim: Claim,
+    /// What was done with the readings of the file.
+    pub remedy: Remedy,
     /// Number of patterns, those that were not read included.
     pub patterns: usize,
     /// The file's own reconstruction, if it holds one.
@@ -145,11 +151,12 @@ impl MeasurementFile {
     /// The place in the file of a reading of [`readings`](Self::readings).
     #[must_use]
     pub fn place(&self, reading: usize) -> usize {
-        match self.claim.form {
+        let at = match self.claim.form {
             Form::Pairs => 2 * self.places[reading / 2] + reading % 2,
             Form::Halves => self.places[reading / 2] + (reading % 2) * self.patterns,
             Form::Single | Form::Differences => self.places[reading],
-        }
+        };
+        self.remedy.place(self.claim.form, self.patterns, at).unwrap_or(at)
     }
 }
 

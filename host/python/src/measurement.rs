@@ -5,7 +5,7 @@ use crate::errors::{refusal, refused};
 use crate::orders::named;
 use crate::work::heavy;
 use nirspi::calibration;
-use nirspi::files::measurement::{Form, Selection};
+use nirspi::files::measurement::{Form, Remedy, Selection};
 use nirspi::source::{Index, OutlierReport, Part, SourceOptions};
 use nirspi_recon::law::{self, Doubt};
 use nirspi_recon::{Dropout, Image, Outlier, Rows, Side};
@@ -87,6 +87,7 @@ impl Options {
             shown: self.shown.as_deref().map(named).transpose()?,
             transpose: self.transpose,
             decimal_comma: self.decimal_comma,
+            remedy: Remedy::default(),
         };
         Ok(SourceOptions {
             index: self.index.as_deref().map(|index| word::<Index>("index", index)).transpose()?,

@@ -69,6 +69,55 @@ fn readings_of_another_form_get_a_warning_that_names_the_form() {
 }
 
 #[test]
+fn what_a_warning_names_is_an_option_that_gives_the_image() {
+    let bench = Bench::new();
+    type Change = fn(Vec<f32>) -> Vec<f32>;
+    let cases: [(&[&str], Change); 6] = [
+        (&["--complements-first"], |y| {
+            y.as_chunks::<2>().0.iter().flat_map(|p| [p[1], p[0]]).collect()
+        }),
+        (&["--inverted"], |y| y.iter().map(|y| -y).collect()),
+        (&["--shift", "1"], |y| [&y[1..], &y[..1]].concat()),
+        (&["--shift", "-1"], |y| [&y[..1], &y[..511]].concat()),
+        (&["--sweeps", "4"], |y| y.repeat(4)),
+        (&["--readings", "halves", "--complements-first"], |y| {
+            y.iter().skip(1).step_by(2).chain(y.iter().step_by(2)).copied().collect()
+        }),
+    ];
+    for (options, change) in cases {
+        let measured = phantom(&bench, change);
+        let (lines, _) = said(&bench, &[]);
+        assert!(lines.contains(&options.join(" ")), "{options:?}: {lines}");
+        let (lines, _) = said(&bench, options);
+        assert!(!lines.contains("warning"), "{options:?}: {lines}");
+        let alike = correlation(&bench.pixels("out/image.npy"), &measured.image);
+        assert!(alike > 0.99, "{options:?}: {alike}");
+    }
+    let spoilt = |options: &[&str]| {
+        bench.run(&[&["reconstruct", "in.npy", "--shown", "natural"], options].concat())
+    };
+    spoilt(&["--sweeps", "3"]).failed(1, &["in.npy", "3 sweeps", "--sweeps"]);
+    let single = ["--readings", "single", "--complements-first"];
+    spoilt(&[&single[..], &["--side", "32"]].concat()).failed(1, &["holds no complements"]);
+    bench.write(
+        "rows.npz",
+        &npz(&[("n", &[], &[2.0]), ("h_row", &[1], &[0.0]), ("y", &[2], &[1.0, 2.0])]),
+    );
+    bench.run(&["reconstruct", "rows.npz", "--sweeps", "2"]).failed(1, &["no --sweeps"]);
+}
+
+#[test]
+fn an_outlier_of_shifted_readings_has_its_number_in_the_file() {
+    let bench = Bench::new();
+    phantom(&bench, |mut y| {
+        y[77] *= 8.0;
+        [&y[1..], &y[..1]].concat()
+    });
+    let (lines, report) = said(&bench, &["--shift", "1"]);
+    assert_eq!(report["outliers"][0]["reading"], 76, "{lines}");
+}
+
+#[test]
 fn several_sweeps_are_counted_unless_the_user_says_the_side() {
     let bench = Bench::new();
     phantom(&bench, |y| y.repeat(4));

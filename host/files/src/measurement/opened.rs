@@ -4,7 +4,7 @@ use super::readings::{NamedReadings, check_infinite, expected_of, found_names, r
 use super::reference::read_reference;
 use super::rows::{Shown, read_rows, read_side, repeats, shown, side_of_pixels};
 use super::sides::make_pairs;
-use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Selection};
+use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Remedy, Selection};
 use crate::field::Field;
 use crate::fields::Fields;
 use nirspi_recon::law::{Claim, OVERLOAD};
@@ -20,6 +20,7 @@ pub(super) struct Opened {
     /// All rows, if each was read: the measurements share them.
     pub(super) every_row: Option<Rows>,
     pub(super) form: Form,
+    pub(super) remedy: Remedy,
     side_guessed: bool,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
@@ -67,6 +68,11 @@ impl Opened {
                     let expected = "n, h_row, and y or d; or --side N";
                     return Err(FileError::Missing { path, field: "n", found, expected });
                 };
+                if want.remedy.sweeps() > 1 {
+                    let expected =
+                        "no --sweeps beside it: it has a row for every pattern of every sweep";
+                    return Err(FileError::field(path, "h_row", "is in the file", expected));
+                }
                 let Shown { rows, shape } = read_rows(&mut fields, side)?;
                 notes.extend(repeats(&rows));
                 notes.extend(side_of_pixels(side, &rows));
@@ -80,9 +86,12 @@ impl Opened {
                      of the patterns as they were shown is exact",
                     entry.package.unwrap_or("its package")
                 )));
-                shown(&mut fields, name, want, form, side, order)?
+                let found = shown(&mut fields, name, want, form, side, order)?;
+                notes.extend(repeats(&found.1));
+                found
             }
         };
+        want.remedy.check(path, &readings.name, form)?;
         if want.transpose {
             let n = side.pixels() as u32;
             for row in rows.iter_mut().flatten() {
@@ -105,6 +114,7 @@ impl Opened {
             rows,
             every_row,
             form,
+            remedy: want.remedy,
             side_guessed,
             readings,
             reference,
@@ -166,12 +176,16 @@ impl Loaded<'_> {
         let Self { opened, numbers } = self;
         let path = opened.fields.path();
         let NamedReadings { name, layout, .. } = &opened.readings;
-        let real = layout.series(&numbers.real, index);
-        let imaginary = numbers.imaginary.as_ref().map(|values| layout.series(values, index));
+        let series = |values: &Vec<f64>| layout.series(values, index);
+        let (real, imaginary) = (series(&numbers.real), numbers.imaginary.as_ref().map(series));
         for values in [Some(&real), imaginary.as_ref()].into_iter().flatten() {
             check_infinite(path, name, values)?;
         }
+        let overloaded = |k: &usize| real[*k].abs() >= OVERLOAD;
+        let overloads = (0..real.len()).filter(overloaded).collect();
         let count = opened.rows.len();
+        let applied = |values| opened.remedy.applied(opened.form, count, values);
+        let (real, imaginary) = (applied(real), imaginary.map(applied));
         let at = |k: usize| {
             let (first, second) = match opened.form {
                 Form::Pairs => (2 * k, Some(2 * k + 1)),
@@ -188,8 +202,6 @@ impl Loaded<'_> {
         if read.is_empty() {
             return Err(opened.no_pattern());
         }
-        let overloaded = |k: &usize| real[*k].abs() >= OVERLOAD;
-        let overloads = (0..real.len()).filter(overloaded).collect();
         let (h_row, groups) = match &opened.every_row {
             Some(every) if not_read.is_empty() => (every.clone(), None),
             _ => {
@@ -224,6 +236,7 @@ impl Loaded<'_> {
             not_read,
             overloads,
             claim: Claim { form: opened.form, side_guessed: opened.side_guessed },
+            remedy: opened.remedy,
             patterns: count,
             reference: opened.reference(index),
             simulated: opened.simulated,

@@ -36,7 +36,12 @@ pub(super) fn shown(
         let expected = format!("an even number: {}", meaning(form));
         return Err(refuse(format!("has {length} readings a measurement"), expected));
     }
-    let count = length / each;
+    let sweeps = want.remedy.sweeps();
+    if !(length / each).is_multiple_of(sweeps) {
+        let found = format!("has {length} readings a measurement");
+        return Err(refuse(found, format!("those of {sweeps} sweeps, as --sweeps says")));
+    }
+    let count = length / each / sweeps;
     let side = match side {
         Some(side) => side,
         None => {
@@ -72,7 +77,8 @@ pub(super) fn shown(
     })?;
     let layout = Layout::of(&shape, length, want.patterns_first)
         .ok_or_else(|| refuse(has_shape(&shape), "readings".to_owned()))?;
-    let rows = rows.iter().take(count).map(|&row| Some(row)).collect();
+    let sweep: Vec<Option<u32>> = rows.iter().take(count).map(|&row| Some(row)).collect();
+    let rows = sweep.repeat(sweeps);
     Ok((side, rows, NamedReadings::new(label.clone(), layout, numbers)))
 }
 

@@ -6,7 +6,7 @@
 
 use super::opened::{Opened, is_reading};
 use super::readings::check_infinite;
-use super::{FileError, Form};
+use super::{FileError, Form, Remedy};
 use crate::stored::Stored;
 use nirspi_recon::law::keeps_the_law;
 use nirspi_recon::{Rows, Side};
@@ -30,7 +30,10 @@ impl<'o> Stack<'o> {
         let Some(rows) = opened.every_row.clone() else {
             return Ok(None);
         };
-        if opened.form != Form::Differences || !opened.readings.layout.is_adjacent() {
+        if opened.form != Form::Differences
+            || opened.remedy != Remedy::default()
+            || !opened.readings.layout.is_adjacent()
+        {
             return Ok(None);
         }
         let numbers = match opened.readings.stored(&mut opened.fields)? {

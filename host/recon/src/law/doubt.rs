@@ -210,32 +210,32 @@ impl fmt::Display for Because {
                 write!(f, "the readings fit the form `{0}`: try --readings {0}", form.name())
             }
             Explanation::ComplementsFirst(form) if form == *claimed => f.write_str(
-                "the readings fit complement first, then pattern; or an inverting amplifier with an offset: exchange the two readings of each pair, or change the sign of all readings",
+                "the readings fit complement first, then pattern; or an inverting amplifier with an offset: try --complements-first",
             ),
             Explanation::ComplementsFirst(form) => write!(
                 f,
-                "the readings fit the form `{0}` with the complements first: change the sign of all readings and try --readings {0}",
+                "the readings fit the form `{0}` with the complements first: try --readings {0} --complements-first",
                 form.name()
             ),
             Explanation::Inverted if *claimed == Form::Single => f.write_str(
-                "the readings fit patterns that light the -1 instead of the +1, or an inverting amplifier: change the sign of all readings",
+                "the readings fit patterns that light the -1 instead of the +1, or an inverting amplifier: try --inverted",
             ),
             Explanation::Inverted => f.write_str(
-                "the readings fit the other sign (an inverting amplifier; or complement less pattern): change the sign of all readings",
+                "the readings fit the other sign (an inverting amplifier; or complement less pattern): try --inverted",
             ),
             Explanation::OneEarly => f.write_str(
-                "the readings fit pairs that are one reading early: the first reading of the sweep is missing; put NaN in front of the readings and leave out the last one",
+                "the readings fit pairs that are one reading early: the first reading of the sweep is missing: try --shift 1",
             ),
             Explanation::OneLate => f.write_str(
-                "the readings fit pairs that are one reading late: the first reading was taken twice or came before the sweep; leave it out and put NaN behind the last one",
+                "the readings fit pairs that are one reading late: the first reading was taken twice or came before the sweep: try --shift -1",
             ),
             Explanation::Samples { each } => write!(
                 f,
-                "the readings fit {each} samples of each reading: average every {each} readings"
+                "the readings fit {each} samples of each reading: nirspi readings --samples {each} averages them"
             ),
             Explanation::Sweeps { count } => write!(
                 f,
-                "the readings fit {count} sweeps one after another: average the sweeps; if this is one sweep of a larger image, say so with --side"
+                "the readings fit {count} sweeps one after another: try --sweeps {count}; if this is one sweep of a larger image, say so with --side"
             ),
             Explanation::Order { all_on } => write!(
                 f,

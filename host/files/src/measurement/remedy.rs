@@ -1,0 +1,89 @@
+//! What must be done with the readings of a file before they are those of its form.
+
+use super::{FileError, Form};
+use std::path::Path;
+
+/// What must be done with the readings of a file, because the user says so. The default is nothing.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Remedy {
+    /// Each complement comes before its pattern.
+    pub complements_first: bool,
+    /// All readings have the other sign: more light gives a lower reading.
+    pub inverted: bool,
+    /// So many readings of the sweep are missing in front of the file's; if negative, so many came before the
+    /// sweep.
+    pub shift: i32,
+    /// So many sweeps came one after another; 0 is one sweep.
+    pub sweeps: u32,
+}
+
+impl Remedy {
+    /// Number of sweeps, at least 1.
+    #[must_use]
+    pub fn sweeps(self) -> usize {
+        self.sweeps.max(1) as usize
+    }
+
+    /// Refuses what the form of the readings leaves no room for.
+    pub(super) fn check(self, path: &Path, field: &str, form: Form) -> Result<(), FileError> {
+        match self.complements_first && form.readings() == 1 {
+            true => {
+                let found = format!("holds no complements ({})", form.name());
+                let expected = "--readings pairs or halves with --complements-first";
+                Err(FileError::field(path, field, found, expected))
+            }
+            false => Ok(()),
+        }
+    }
+
+    /// The place among the readings of the file of the reading at `at`; `None` for a reading that is missing.
+    pub(super) fn place(self, form: Form, patterns: usize, at: usize) -> Option<usize> {
+        let at = match form {
+            Form::Pairs if self.complements_first => at ^ 1,
+            Form::Halves if self.complements_first => (at + patterns) % (2 * patterns),
+            _ => at,
+        };
+        usize::try_from(at as i64 - i64::from(self.shift)).ok()
+    }
+
+    /// The readings of the form; NaN for one that is missing.
+    pub(super) fn applied(self, form: Form, patterns: usize, readings: Vec<f64>) -> Vec<f64> {
+        if self == Self::default() {
+            return readings;
+        }
+        let sign = if self.inverted { -1.0 } else { 1.0 };
+        let of = |at| self.place(form, patterns, at).and_then(|place| readings.get(place));
+        (0..readings.len()).map(|at| of(at).map_or(f64::NAN, |reading| sign * reading)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_come_to_their_places_and_keep_the_number_of_the_file() {
+        let is = |remedy: Remedy, form, expected: [f64; 6]| {
+            let found = remedy.applied(form, 3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+            for (at, (found, expected)) in found.iter().zip(expected).enumerate() {
+                assert!(found == &expected || found.is_nan() && expected.is_nan(), "{remedy:?}");
+                if !found.is_nan() {
+                    let place = remedy.place(form, 3, at).unwrap();
+                    assert_eq!(found.abs(), place as f64 + 1.0, "{remedy:?}");
+                }
+            }
+        };
+        let none = Remedy::default();
+        let first = Remedy { complements_first: true, ..none };
+        is(none, Form::Pairs, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        is(first, Form::Pairs, [2.0, 1.0, 4.0, 3.0, 6.0, 5.0]);
+        is(first, Form::Halves, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
+        let inverted = Remedy { inverted: true, ..none };
+        is(inverted, Form::Single, [-1.0, -2.0, -3.0, -4.0, -5.0, -6.0]);
+        let nan = f64::NAN;
+        is(Remedy { shift: 2, ..none }, Form::Single, [nan, nan, 1.0, 2.0, 3.0, 4.0]);
+        is(Remedy { shift: -1, ..none }, Form::Single, [2.0, 3.0, 4.0, 5.0, 6.0, nan]);
+        is(Remedy { shift: 1, ..first }, Form::Pairs, [1.0, nan, 3.0, 2.0, 5.0, 4.0]);
+        assert_eq!((none.sweeps(), Remedy { sweeps: 4, ..none }.sweeps()), (1, 4));
+    }
+}
