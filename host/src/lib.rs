@@ -37,6 +37,8 @@ pub mod depth_image;
 pub mod export;
 pub mod heartbeat;
 pub mod imaging;
+#[cfg(not(target_family = "wasm"))]
+pub mod inspect;
 #[cfg(feature = "pictures")]
 pub mod picture;
 #[cfg(not(target_family = "wasm"))]

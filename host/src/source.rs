@@ -399,12 +399,17 @@ impl SourceOptions {
     }
 }
 
-fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, SourceError> {
-    let mut notes = file.notes.clone();
+/// The measurements of a file, by the law of readings; of complex readings, the imaginary parts as well, if
+/// both parts are wanted.
+pub(crate) fn by_law(
+    path: &Path,
+    file: &MeasurementFile,
+    part: Part,
+) -> Result<(Reading, Option<Measurements>), SourceError> {
     let wrong = |problem| SourceError::Measurements { path: path.to_owned(), problem };
     // The law of readings is that of light, and light has no phase.
     let plain = |readings: &Readings| as_they_are(&file.h_row, readings).map_err(wrong);
-    let (read, imaginary) = match (&file.imaginary, part) {
+    Ok(match (&file.imaginary, part) {
         (None, _) => {
             let y = file.readings.values();
             let mut read = law::read(&file.h_row, y, file.claim).map_err(wrong)?;
@@ -418,7 +423,12 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         (Some(imaginary), Part::Magnitude) => {
             (plain(&file.readings)?, Some(plain(imaginary)?.measurements))
         }
-    };
+    })
+}
+
+fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, SourceError> {
+    let mut notes = file.notes.clone();
+    let (read, imaginary) = by_law(path, &file, part)?;
     if let Some(level) = read.dark_level {
         notes.push(format!("a dark level of {level:.4} was found in `y` and removed"));
     }

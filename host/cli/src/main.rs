@@ -24,6 +24,7 @@ mod flash;
 mod gateware;
 mod headings;
 mod info;
+mod inspect;
 mod method;
 mod metrics;
 mod networks;
@@ -94,6 +95,7 @@ commands! {
     Demo(demo::Args) => demo::run,
     Example(example::Args) => example::run,
     Reconstruct(reconstruct::Args) => reconstruct::run,
+    Inspect(inspect::Args) => inspect::run,
     Readings(readings::Args) => readings::run,
     Capture(capture::Args) => capture::run,
     Export(export::Args) => export::run,

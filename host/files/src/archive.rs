@@ -196,6 +196,13 @@ impl Archive {
         Ok(found)
     }
 
+    /// The type of the numbers of a field, as NumPy calls it; `None` if they are no numbers.
+    pub(super) fn kind(&mut self, field: &str) -> Option<String> {
+        self.member(field, |_| Ok(()), |header, _| Ok(header.type_name()))
+            .ok()
+            .map(|(_, kind)| kind)
+    }
+
     fn member<D>(
         &mut self,
         field: &str,

@@ -135,6 +135,18 @@ impl Header {
         &self.shape
     }
 
+    /// The type of the numbers, as NumPy calls it.
+    pub(super) fn type_name(&self) -> String {
+        let kind = match self.dtype.kind {
+            Kind::Bool => return "bool".to_owned(),
+            Kind::Signed => "int",
+            Kind::Unsigned => "uint",
+            Kind::Float => "float",
+            Kind::Complex => "complex",
+        };
+        format!("{kind}{}", 8 * self.dtype.size)
+    }
+
     /// Whether the array's numbers are single bytes, 0 to 255.
     pub(super) fn is_bytes(&self) -> bool {
         self.dtype.kind == Kind::Unsigned && self.dtype.size == 1

@@ -36,6 +36,7 @@ pub(super) struct Fields {
     made: Vec<(String, Field)>,
     /// What a text has beside its table and is left out, in one line.
     skipped: Option<String>,
+    is_text: bool,
 }
 
 enum Format {
@@ -59,7 +60,7 @@ impl Fields {
             .take(START_BYTES)
             .read_to_end(&mut start)
             .map_err(|error| FileError::io(path, "read", error))?;
-        let mut skipped = None;
+        let (mut skipped, mut is_text) = (None, false);
         let (names, format) = if start.starts_with(b"PK") {
             let archive = Archive::open(path)?;
             (archive.names().to_vec(), Format::Npz(archive))
@@ -75,7 +76,7 @@ impl Fields {
             (mat.names(), Format::Mat4(mat))
         } else if text::is_start(&start) {
             let text = text::read(path, decimal_comma)?;
-            skipped = text.skipped;
+            (skipped, is_text) = (text.skipped, true);
             match text.numbers {
                 text::Numbers::Columns(columns) => {
                     let (names, fields) = columns.into_iter().unzip();
@@ -89,7 +90,59 @@ impl Fields {
         if decimal_comma && !matches!(format, Format::Columns(_) | Format::Unnamed(_)) {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
-        Ok(Self { path: path.to_owned(), names, format, made: Vec::new(), skipped })
+        Ok(Self { path: path.to_owned(), names, format, made: Vec::new(), skipped, is_text })
+    }
+
+    /// One array without a name that was made of the file at `path`.
+    pub(super) fn of_array(path: &Path, field: Field) -> Self {
+        let (names, made) = (Vec::new(), Vec::new());
+        Self {
+            path: path.to_owned(),
+            names,
+            format: Format::Unnamed(field),
+            made,
+            skipped: None,
+            is_text: false,
+        }
+    }
+
+    /// The same file again, without what was made of its fields. A text is not parsed again.
+    pub(super) fn again(&self) -> Result<Self, FileError> {
+        let format = match &self.format {
+            Format::Columns(columns) => Format::Columns(columns.clone()),
+            Format::Unnamed(field) => Format::Unnamed(field.clone()),
+            _ => return Self::open(&self.path, false),
+        };
+        let (path, names) = (self.path.clone(), self.names.clone());
+        let (skipped, is_text) = (self.skipped.clone(), self.is_text);
+        Ok(Self { path, names, format, made: Vec::new(), skipped, is_text })
+    }
+
+    /// The format, in a few words.
+    pub(super) fn format(&self) -> &'static str {
+        match &self.format {
+            Format::Npz(_) => "a NumPy archive",
+            Format::Mat(_) => "a MATLAB file",
+            Format::Mat4(_) => "a MATLAB file of level 4",
+            #[cfg(feature = "hdf5")]
+            Format::Hdf5(_) => "an HDF5 file",
+            _ if self.is_text => "a text table",
+            Format::Columns(_) | Format::Unnamed(_) => "a NumPy array",
+        }
+    }
+
+    /// The type of the numbers of a field, if the format says so without their being read.
+    pub(super) fn kind(&mut self, field: &str) -> Option<String> {
+        match &mut self.format {
+            Format::Npz(archive) => archive.kind(field),
+            Format::Unnamed(_) if !self.is_text => npy::kind(&self.path),
+            _ => None,
+        }
+    }
+
+    /// Whether the file is a text.
+    pub(super) fn is_text(&self) -> bool {
+        self.is_text
     }
 
     pub(super) fn path(&self) -> &Path {

@@ -17,6 +17,8 @@ pub mod boards;
 pub mod causes;
 pub mod clock;
 #[cfg(not(target_family = "wasm"))]
+pub mod contents;
+#[cfg(not(target_family = "wasm"))]
 pub mod folder;
 pub mod identity;
 #[cfg(feature = "pictures")]

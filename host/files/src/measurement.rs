@@ -45,6 +45,7 @@ mod stack;
 mod write;
 
 use super::FileError;
+use super::fields::Fields;
 pub use form::Form;
 pub use images::read_images_of;
 use nirspi_recon::law::Claim;
@@ -165,8 +166,14 @@ impl MeasurementFile {
 /// # Errors
 /// [`FileError`], one line that names file, field, what was found and what was expected.
 pub fn read(path: &Path, want: &Selection) -> Result<MeasurementFile, FileError> {
-    let mut file = Opened::open(path, want)?;
-    let index = file.readings.layout.choose(path, &file.readings.name, want.index)?;
+    read_fields(Fields::open(path, want.decimal_comma)?, want)
+}
+
+/// Reads the measurement of an open file.
+pub(crate) fn read_fields(fields: Fields, want: &Selection) -> Result<MeasurementFile, FileError> {
+    let path = fields.path().to_owned();
+    let mut file = Opened::of(fields, want)?;
+    let index = file.readings.layout.choose(&path, &file.readings.name, want.index)?;
     file.loaded()?.measurement(index)
 }
 

@@ -138,6 +138,12 @@ pub(super) fn each_block(
     Ok(read_array(path, expected, fits, shapes, decode)?.0.shape().to_vec())
 }
 
+/// The type of the numbers of a `.npy` file, as NumPy calls it; `None` if they are no numbers.
+pub(super) fn kind(path: &Path) -> Option<String> {
+    let decode = |header: &Header, _: &mut BufReader<File>, _| Ok(header.type_name());
+    read_array(path, EXPECTED, |_| true, "", decode).ok().map(|(_, kind)| kind)
+}
+
 /// Reads the header and the numbers of a `.npy` file whose shape fits.
 fn read_numbers<T: Sample>(
     path: &Path,

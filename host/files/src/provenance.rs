@@ -314,7 +314,8 @@ fn without_secrets(argument: &str) -> String {
 }
 
 /// A word as a POSIX shell reads it.
-fn quoted(word: &str) -> String {
+#[must_use]
+pub fn quoted(word: &str) -> String {
     let plain = |letter: char| letter.is_alphanumeric() || "_-./:=,%+@".contains(letter);
     match !word.is_empty() && word.chars().all(plain) {
         true => word.to_owned(),

@@ -4,6 +4,7 @@
 //! A [`Measurements`] has one finite value for each of its [`Rows`], whatever it was built from
 //! (`tests::each_fault_is_named`).
 
+mod binned;
 mod shorter_sweep;
 
 pub use shorter_sweep::ShorterSweep;

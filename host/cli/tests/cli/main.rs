@@ -22,6 +22,7 @@ mod enhance;
 mod everyday;
 mod foreign_devices;
 mod forms;
+mod inspect;
 mod many;
 mod metrics;
 mod options;

@@ -164,7 +164,7 @@ fn every_line_of_the_first_picture_runs_as_it_stands() {
 #[test]
 #[ignore = "long: .ci/run demo"]
 fn every_line_of_the_page_about_measurements_runs_as_it_stands() {
-    assert_eq!(runs_as_it_stands(&Bench::new(), "docs/measurements.md").len(), 4);
+    assert_eq!(runs_as_it_stands(&Bench::new(), "docs/measurements.md").len(), 5);
 }
 
 #[test]

@@ -37,7 +37,12 @@ pub(super) struct Loaded<'o> {
 
 impl Opened {
     pub(super) fn open(path: &Path, want: &Selection) -> Result<Self, FileError> {
-        let mut fields = Fields::open(path, want.decimal_comma)?;
+        Self::of(Fields::open(path, want.decimal_comma)?, want)
+    }
+
+    /// The measurements of an open file.
+    pub(super) fn of(mut fields: Fields, want: &Selection) -> Result<Self, FileError> {
+        let path = &*fields.path().to_owned();
         let side = read_side(&mut fields, want)?;
         let has_rows = fields.holds("h_row");
         if has_rows && want.shown.is_some() {

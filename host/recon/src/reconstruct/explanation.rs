@@ -8,10 +8,6 @@ use std::fmt;
 /// The most readings by which a recording may have begun early or late.
 const MOST_READINGS: usize = 3;
 
-/// Standard errors of [`HeldBack::score`] from which an explanation is named: the best of some
-/// twenty tries is above 3 by chance now and then.
-const NAMED: f64 = 5.0;
-
 /// What would explain readings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -68,7 +64,7 @@ pub fn explanation(measurements: &Measurements) -> Option<Explanation> {
     let best = tried.iter().map(|(_, score)| *score).fold(f64::NEG_INFINITY, f64::max);
     // An order and its transpose explain a symmetrical scene equally well.
     let named = tried.into_iter().find(|(_, score)| *score >= 0.9 * best);
-    named.filter(|_| best >= NAMED).map(|(explanation, _)| explanation)
+    named.filter(|_| best >= HeldBack::AMONG_MANY).map(|(explanation, _)| explanation)
 }
 
 /// What Tikhonov's method says of held-back readings.

@@ -27,6 +27,10 @@ impl HeldBack {
     /// The most standard errors that are put down to chance.
     pub const BY_CHANCE: f64 = 3.0;
 
+    /// Standard errors from which one of many tries is named: the best of some twenty is above
+    /// [`Self::BY_CHANCE`] by chance now and then.
+    pub const AMONG_MANY: f64 = 5.0;
+
     /// Judges predictions, one for each reading. `trust` is the factor that the picture uses them
     /// with. `None` if there are no readings beside the all-ones pattern's, or all of those that
     /// [`Self::miss`] counts are 0.

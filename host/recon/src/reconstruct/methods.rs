@@ -40,6 +40,9 @@ impl Method {
     /// Tikhonov's method, with a covariance prior.
     pub const TIKHONOV: Self = tikhonov::METHOD;
 
+    /// Total variation.
+    pub const TOTAL_VARIATION: Self = total_variation::METHOD;
+
     /// The learned prior, which needs [`MethodSettings::network`](super::MethodSettings::network); `nirspi_nets::prior::settings`
     /// has the shipped one.
     pub const PRIOR: Self = prior::METHOD;
