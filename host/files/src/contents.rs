@@ -2,7 +2,7 @@
 //! then read as a measurement in several ways.
 //!
 //! # Invariant
-//! [`Contents::measurement`] reads as [`measurement::read`](crate::measurement::read) reads the file
+//! [`Contents::measurement`] reads as [`measurement::read`] reads the file
 //! (`tests::a_measurement_is_the_one_that_the_file_gives`).
 
 use super::FileError;
@@ -180,7 +180,7 @@ impl Contents {
     /// The measurement of this file that a user asks for.
     ///
     /// # Errors
-    /// As [`measurement::read`](crate::measurement::read).
+    /// As [`measurement::read`].
     pub fn measurement(&self, want: &Selection) -> Result<MeasurementFile, FileError> {
         measurement::read_fields(self.fields.again()?, want)
     }
@@ -189,7 +189,7 @@ impl Contents {
 /// The measurement of readings that were made of the file `path` before, such as those of a trace.
 ///
 /// # Errors
-/// As [`measurement::read`](crate::measurement::read).
+/// As [`measurement::read`].
 pub fn of_readings(
     path: &Path,
     readings: Vec<f64>,
