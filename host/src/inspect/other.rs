@@ -1,7 +1,7 @@
 //! What a file holds beside readings, or instead: traces and patterns of a user's own.
 
 use super::trial::Guess;
-use super::ways::NO_READINGS;
+use super::ways::{NO_READINGS, is_long};
 use super::{command, command::Command};
 use crate::files::contents::{Array, Contents};
 use crate::files::trace::{self, Cut};
@@ -164,9 +164,19 @@ fn steps(numbers: &[f64]) -> Option<(usize, usize)> {
         let in_step = jumps.iter().filter(|&&at| (at - first).is_multiple_of(samples)).count();
         in_step as f64 >= IN_STEP * jumps.len() as f64
     };
-    let longest = numbers.len() / LEAST_JUMPS;
-    let samples = (LEAST_SAMPLES..=longest).rev().filter(|_| jumps.len() >= LEAST_JUMPS);
-    samples.into_iter().find(|&samples| fits(samples)).map(|samples| (samples, first))
+    if jumps.len() < LEAST_JUMPS {
+        return None;
+    }
+    // A jump out of step spoils two gaps.
+    let mut gaps: Vec<usize> = jumps.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_unstable();
+    let longest = gaps[(2.0 * (1.0 - IN_STEP) * gaps.len() as f64) as usize];
+    (LEAST_SAMPLES..=longest).rev().find(|&samples| fits(samples)).map(|samples| (samples, first))
+}
+
+/// Whether an array varies otherwise than times and counters do.
+fn is_signal(array: &Array) -> bool {
+    array.numbers.as_ref().is_some_and(|look| !look.is_counter)
 }
 
 /// Whether numbers are at two levels and rise from one to the other several times.
@@ -257,6 +267,14 @@ pub(super) fn unexplained(
 ) -> Option<Finding> {
     if !findings.is_empty() || guesses.iter().any(Guess::fits) {
         return None;
+    }
+    if let Some(long) = contents.arrays().iter().find(|array| is_long(array) && is_signal(array)) {
+        let cut = Command::new("readings", path)
+            .some("--field", (!long.name.is_empty()).then_some(&long.name))
+            .option("--samples", "K")
+            .option("--out", "readings.npz");
+        let what = "more numbers than a sweep has readings: samples of a trace, perhaps".to_owned();
+        return Some(Finding { what, commands: vec![cut.line()] });
     }
     let picture = contents.arrays().iter().find(|array| array.axes().len() > 1);
     let what = match (guesses.is_empty(), picture) {

@@ -33,6 +33,9 @@ const MOST_FIELDS: usize = 4;
 /// How many patterns a recording may have begun early or late.
 const SHIFTS: [i32; 4] = [1, -1, 2, -2];
 
+/// The most readings of a sweep: pairs of the patterns of 256 x 256 pixels.
+const MOST_READINGS: usize = 2 << 16;
+
 /// Fewest readings of a measurement.
 const LEAST: usize = 4;
 
@@ -376,6 +379,10 @@ fn transposed(rows: &Rows) -> Vec<u32> {
 fn bases(contents: &Contents) -> Vec<Selection> {
     let arrays = contents.arrays();
     let holds = |name: &str| arrays.iter().any(|array| array.name == name);
+    if array_of(arrays, "h_row").is_none() && arrays.iter().any(is_long) {
+        // Samples, of which readings are made first.
+        return Vec::new();
+    }
     let fields: Vec<Option<String>> = match () {
         () if contents.is_unnamed() => match arrays.iter().any(is_patterns) {
             true => return Vec::new(),
@@ -433,12 +440,17 @@ fn array_of<'a>(arrays: &'a [Array], name: &str) -> Option<&'a Array> {
     arrays.iter().find(|array| array.name == name)
 }
 
+/// Whether an array has more numbers along one axis than a sweep has readings.
+pub(super) fn is_long(array: &Array) -> bool {
+    matches!(array.axes()[..], [count] if count > MOST_READINGS)
+}
+
 /// Arrays that may be readings.
 fn readings_of(arrays: &[Array]) -> impl Iterator<Item = &Array> {
     arrays.iter().filter(|array| {
         let look = array.numbers.as_ref();
         let varies = look
             .is_some_and(|look| !look.is_counter && look.count >= LEAST && look.levels.is_none());
-        varies && !NO_READINGS.contains(&&*array.name) && !is_patterns(array)
+        varies && !is_long(array) && !NO_READINGS.contains(&&*array.name) && !is_patterns(array)
     })
 }

@@ -216,6 +216,11 @@ fn patterns_traces_and_recordings_are_named_for_what_they_are() {
         std::fs::remove_dir_all(bench.path("out")).unwrap();
     }
 
+    let noise: Vec<f32> = (0..140_000_u32).map(|k| (k.wrapping_mul(k) % 8191) as f32).collect();
+    bench.write("long.npy", &encode(&[noise.len()], &noise));
+    let said = bench.run(&["inspect", "long.npy"]).succeeded().stdout;
+    assert!(said.contains("   nirspi readings long.npy --samples K --out readings.npz"), "{said}");
+
     bench.run(&["capture", "--frames", "5", "--out", "rec.mcap"]).succeeded();
     let said = bench.run(&["inspect", "rec.mcap"]).succeeded().stdout;
     for words in
