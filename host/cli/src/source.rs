@@ -27,7 +27,8 @@ pub struct SourceArgs {
     #[arg(long, value_name = "N")]
     pub side: Option<u64>,
     /// The field of the file that holds the readings, or the two fields of patterns and complements, with a comma between
-    /// [default: y if the file has it, else d]
+    /// [default: y if the file has it, else d]. Beside it, fields that the file calls something else: volts,h_row=order,n=side;
+    /// so can sign
     #[arg(long, value_name = "NAME")]
     pub field: Option<String>,
     /// How readings belong to patterns [default: pairs; differences in the field d]

@@ -53,6 +53,9 @@ pub struct Look {
     pub levels: Option<Vec<f64>>,
     /// Whether the numbers grow in even steps, as times and counters do.
     pub is_counter: bool,
+    /// Whether the numbers look like rows of patterns: different whole numbers from 0 on, enough of them for
+    /// part of a sweep.
+    pub is_rows: bool,
     /// Whether the numbers are complex.
     pub is_complex: bool,
 }
@@ -78,6 +81,7 @@ impl Look {
             missing: numbers.iter().filter(|number| number.is_nan()).count(),
             levels: (levels.len() <= LEVELS && !levels.is_empty()).then_some(levels),
             is_counter: is_counter(numbers),
+            is_rows: is_rows(numbers),
             is_complex: field.imaginary.is_some(),
         }
     }
@@ -88,6 +92,20 @@ fn is_counter(numbers: &[f64]) -> bool {
     let step = (last - first) / (numbers.len() - 1).max(1) as f64;
     let even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= UNEVEN * step;
     numbers.len() > 2 && step > 0.0 && numbers.windows(2).all(even)
+}
+
+/// Least share of the rows of a sweep that a list of rows has.
+const LEAST_SHARE: usize = 8;
+
+fn is_rows(numbers: &[f64]) -> bool {
+    let most = numbers.iter().copied().fold(0.0, f64::max);
+    let whole = |number: &f64| number.fract() == 0.0 && *number >= 0.0;
+    if numbers.len() < 4 || most > f64::from(1 << 16) || !numbers.iter().all(whole) {
+        return false;
+    }
+    let mut seen = vec![false; most as usize + 1];
+    let different = numbers.iter().all(|&row| !std::mem::replace(&mut seen[row as usize], true));
+    different && seen[0] && LEAST_SHARE * numbers.len() >= seen.len()
 }
 
 impl Array {
@@ -223,6 +241,16 @@ mod tests {
         assert_eq!(contents.arrays().len(), 3);
         let look = |name| array(&contents, name).numbers.clone().unwrap();
         assert!(look("time").is_counter && !look("CH1").is_counter && !look("TRIG").is_counter);
+        assert!(!look("CH1").is_rows && !look("TRIG").is_rows && !look("time").is_rows);
+        assert!(is_rows(&[3.0, 0.0, 1.0, 2.0]) && is_rows(&[0.0, 30.0, 2.0, 9.0]));
+        for other in [
+            [3.0, 0.0, 1.0, 3.0],
+            [3.0, 0.5, 1.0, 0.0],
+            [3.0, 4.0, 1.0, 2.0],
+            [0.0, 1.0, 2.0, 40.0],
+        ] {
+            assert!(!is_rows(&other), "{other:?}");
+        }
         assert_eq!((look("CH1").count, look("CH1").missing), (20, 1));
         assert_eq!(look("CH1").range, Some([0.5, 10.5]));
         assert_eq!((look("TRIG").levels, look("CH1").levels), (Some(vec![0.0, 5.0]), None));

@@ -34,6 +34,8 @@ pub(super) struct Fields {
     format: Format,
     /// Fields that were made of those of the file, and stand for fields of their names.
     made: Vec<(String, Field)>,
+    /// Names that stand for fields of other names.
+    called: Vec<(&'static str, String)>,
     /// What a text has beside its table and is left out, in one line.
     skipped: Option<String>,
     is_text: bool,
@@ -90,7 +92,8 @@ impl Fields {
         if decimal_comma && !matches!(format, Format::Columns(_) | Format::Unnamed(_)) {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
-        Ok(Self { path: path.to_owned(), names, format, made: Vec::new(), skipped, is_text })
+        let (path, made, called) = (path.to_owned(), Vec::new(), Vec::new());
+        Ok(Self { path, names, format, made, called, skipped, is_text })
     }
 
     /// One array without a name that was made of the file at `path`.
@@ -101,6 +104,7 @@ impl Fields {
             names,
             format: Format::Unnamed(field),
             made,
+            called: Vec::new(),
             skipped: None,
             is_text: false,
         }
@@ -115,7 +119,8 @@ impl Fields {
         };
         let (path, names) = (self.path.clone(), self.names.clone());
         let (skipped, is_text) = (self.skipped.clone(), self.is_text);
-        Ok(Self { path, names, format, made: Vec::new(), skipped, is_text })
+        let (made, called) = (Vec::new(), Vec::new());
+        Ok(Self { path, names, format, made, called, skipped, is_text })
     }
 
     /// The format, in a few words.
@@ -176,7 +181,19 @@ impl Fields {
     }
 
     pub(super) fn holds(&self, field: &str) -> bool {
-        self.names.iter().any(|name| name == field)
+        let field = self.own_name(field);
+        self.names.contains(&field)
+    }
+
+    /// Lets a name stand for the field that the file calls `own`.
+    pub(super) fn call(&mut self, own: &str, name: &'static str) {
+        self.called.push((name, own.to_owned()));
+    }
+
+    /// The file's own name of a field.
+    fn own_name(&self, field: &str) -> String {
+        let called = self.called.iter().find(|(name, _)| *name == field);
+        called.map_or_else(|| field.to_owned(), |(_, own)| own.clone())
     }
 
     /// Reads a field. `accept` checks the shape; its error is a description of the expected shape.
@@ -185,15 +202,16 @@ impl Fields {
         field: &str,
         accept: impl Fn(&[u64]) -> Result<(), String>,
     ) -> Result<Field, FileError> {
-        let at = self.names.iter().position(|name| name == field);
+        let own = self.own_name(field);
+        let at = self.names.iter().position(|name| *name == own);
         let made = self.made.iter().find(|(name, _)| name == field).map(|(_, made)| made.clone());
         let loaded = match &mut self.format {
             _ if made.is_some() => made,
-            Format::Npz(archive) => return archive.field(field, accept),
-            Format::Mat(mat) => return mat.read(field, accept),
-            Format::Mat4(mat) => return mat.read(field, accept),
+            Format::Npz(archive) => return archive.field(&own, accept),
+            Format::Mat(mat) => return mat.read(&own, accept),
+            Format::Mat4(mat) => return mat.read(&own, accept),
             #[cfg(feature = "hdf5")]
-            Format::Hdf5(file) => return file.read(field, accept),
+            Format::Hdf5(file) => return file.read(&own, accept),
             Format::Columns(fields) => at.and_then(|at| fields.get(at)).cloned(),
             Format::Unnamed(field) => Some(field.clone()),
         };
@@ -217,9 +235,10 @@ impl Fields {
         field: &str,
         accept: impl Fn(&[u64]) -> Result<(), String>,
     ) -> Result<(Vec<u64>, Option<Field>), FileError> {
+        let own = self.own_name(field);
         let (shape, numbers) = match &mut self.format {
             Format::Npz(archive) if !self.made.iter().any(|(name, _)| name == field) => {
-                (archive.shape(field, accept)?, None)
+                (archive.shape(&own, accept)?, None)
             }
             _ => {
                 let numbers = self.read(field, accept)?;
@@ -239,9 +258,10 @@ impl Fields {
 
     /// A field whose real numbers lie in the file as they are; `None` for any other field.
     pub(super) fn stored(&mut self, field: &str) -> Result<Option<Stored>, FileError> {
+        let own = self.own_name(field);
         match &mut self.format {
             Format::Npz(archive) if !self.made.iter().any(|(name, _)| name == field) => {
-                archive.stored(field)
+                archive.stored(&own)
             }
             _ => Ok(None),
         }

@@ -30,6 +30,7 @@
 //! holds the readings.
 
 mod axes;
+mod called;
 mod form;
 mod images;
 mod layout;
@@ -67,7 +68,8 @@ pub struct Selection {
     /// How readings belong to patterns. By default, `y` holds pairs and `d` differences.
     pub form: Option<Form>,
     /// The field of the readings, or the two fields of patterns and of complements:
-    /// `positive,negative`. By default `y`, or else `d`.
+    /// `positive,negative`. By default `y`, or else `d`. `h_row=NAME`, `n=NAME` and `sign=NAME` beside them are
+    /// fields that the file calls something else.
     pub field: Option<String>,
     /// Whether patterns are along the first axis instead of the last.
     pub patterns_first: bool,

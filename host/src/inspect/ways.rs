@@ -130,7 +130,7 @@ impl<'t> Trials<'t> {
             return;
         }
         self.visited.push(visit);
-        let has_rows = self.has_rows && trace.is_none();
+        let has_rows = (self.has_rows || names_rows(&base)) && trace.is_none();
         let first = Selection { shown: (!has_rows).then_some(Order::Natural), ..base };
         let Some((first, file)) = self.read(trace, first) else { return };
         self.tried += 1;
@@ -265,11 +265,11 @@ impl<'t> Trials<'t> {
         for shift in SHIFTS {
             let form = base.form.unwrap_or(self.default_form(base));
             let remedy = Remedy { shift: shift * form.readings() as i32, ..Remedy::default() };
-            let order = (!self.has_rows).then_some(Order::Natural);
+            let has_rows = self.has_rows || names_rows(base);
+            let order = (!has_rows).then_some(Order::Natural);
             let want = Selection { remedy, shown: order, ..base.clone() };
             let Some((want, file)) = self.read(None, want) else { return };
             self.tried += 1;
-            let has_rows = self.has_rows;
             let fits =
                 |verdict: &Verdict| !verdict.by_chance(has_rows) && !verdict.is_contradicted();
             let verdict = self.judge.of(self.path, &file);
@@ -281,7 +281,7 @@ impl<'t> Trials<'t> {
                 mirrored: None,
             });
             let mut all: Vec<Tried> = first.into_iter().collect();
-            if !self.has_rows {
+            if !has_rows {
                 all.extend(self.orders(None, &want, &mut |verdict| fits(verdict)));
             }
             self.mirror(&mut all);
@@ -292,7 +292,7 @@ impl<'t> Trials<'t> {
     /// The sides of which the readings may be a part of a sweep.
     fn sides(&self, base: &Selection) -> Vec<Selection> {
         let holds = |name: &str| self.contents.arrays().iter().find(|array| array.name == name);
-        if holds("n").is_some() {
+        if holds("n").is_some() || base.side.is_some() {
             return Vec::new();
         }
         let rows = holds("h_row").and_then(|array| array.numbers.as_ref()?.range);
@@ -426,13 +426,45 @@ fn bases(contents: &Contents) -> Vec<Selection> {
             }));
         }
     }
-    found
+    with_rows(arrays, &found).into_iter().chain(found.clone()).collect()
+}
+
+/// The same ways with rows that the file does not call `h_row`.
+fn with_rows(arrays: &[Array], ways: &[Selection]) -> Vec<Selection> {
+    let is_rows = |array: &&Array| array.numbers.as_ref().is_some_and(|look| look.is_rows);
+    let named = |array: &&Array| !array.name.is_empty() && !NO_READINGS.contains(&&*array.name);
+    let (None, Some(rows)) = (array_of(arrays, "h_row"), arrays.iter().filter(named).find(is_rows))
+    else {
+        return Vec::new();
+    };
+    let last = rows.numbers.as_ref().and_then(|look| look.range).map_or(0.0, |[_, last]| last);
+    let side = (1..=8).filter_map(|power| Side::new(1 << power).ok());
+    let side = side.into_iter().find(|side| side.area() as f64 > last);
+    let others = ways.iter().filter(|way| {
+        let fields = way.field.as_deref().unwrap_or_default();
+        fields.split(',').all(|field| field != rows.name)
+    });
+    let with = |way: &Selection| {
+        let field = way.field.iter().map(|field| format!("{field},")).collect::<String>();
+        Selection {
+            field: Some(format!("{field}h_row={}", rows.name)),
+            side: side.filter(|_| array_of(arrays, "n").is_none()),
+            ..way.clone()
+        }
+    };
+    others.map(with).collect()
+}
+
+/// Whether a way names the rows of the patterns.
+fn names_rows(want: &Selection) -> bool {
+    want.field.as_ref().is_some_and(|field| field.contains("h_row="))
 }
 
 /// The form of a field, or of the field that is read by default, if the user says none.
 fn default_form(arrays: &[Array], field: Option<&str>) -> Form {
     let holds = |name| array_of(arrays, name).is_some();
-    let is_d = field.map_or(holds("d") && !holds("y"), |field| field == "d");
+    let own = field.and_then(|field| field.split(',').find(|part| !part.contains('=')));
+    let is_d = own.map_or(holds("d") && !holds("y"), |field| field == "d");
     if is_d { Form::Differences } else { Form::Pairs }
 }
 

@@ -89,6 +89,12 @@ fn forms(measured: &Measured) -> Vec<Form> {
             &["--field", "volts"],
         ),
         form(
+            "calls `h_row`, `n` or `sign` something else",
+            "named.npz",
+            npz(&[("side", &[], &[n as f32]), ("shown", &[area], &rows), readings]),
+            &["--field", "y,h_row=shown,n=side"],
+        ),
+        form(
             "has patterns and complements in two fields or columns",
             "two.npz",
             npz(&[whole, shown, ("on", &[area], &on), ("off", &[area], &off)]),

@@ -103,6 +103,12 @@ fn the_first_command_gives_the_image() {
             "natural",
         ),
         ("rows.npz", npz(&[whole, rows, ("my volts", &n, y)]), "pairs", "of h_row"),
+        (
+            "other names.npz",
+            npz(&[("shown", &[256], &scene.measured.h_row), ("volts", &n, &scene.measured.y)]),
+            "pairs",
+            "of h_row",
+        ),
         ("several.npz", npz(&[whole, rows, ("y", &[2, 512], &y.repeat(2))]), "pairs", "of h_row"),
         (
             "two columns.csv",

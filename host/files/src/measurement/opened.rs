@@ -1,5 +1,6 @@
 //! An open file whose shapes fit together, and its measurements one by one.
 
+use super::called::called;
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
 use super::rows::{Shown, read_rows, read_side, repeats, shown, side_of_pixels};
@@ -43,14 +44,14 @@ impl Opened {
     /// The measurements of an open file.
     pub(super) fn of(mut fields: Fields, want: &Selection) -> Result<Self, FileError> {
         let path = &*fields.path().to_owned();
+        let want = &*called(&mut fields, want)?;
         let side = read_side(&mut fields, want)?;
         let has_rows = fields.holds("h_row");
         if has_rows && want.shown.is_some() {
             return Err(FileError::field(path, "h_row", "is in the file", "no --shown beside it"));
         }
         if !has_rows && want.shown.is_none() {
-            let expected =
-                "n, h_row, and y or d; or --shown ORDER for patterns shown in a known order";
+            let expected = "n, h_row, and y or d, or --field h_row=NAME for another name; or --shown ORDER for patterns in a known order";
             let found = found_names(&fields);
             return Err(FileError::Missing {
                 path: path.to_owned(),

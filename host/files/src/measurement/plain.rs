@@ -1,6 +1,7 @@
 //! Readings of patterns of a user's own, for `--matrix`.
 
 use super::axes::joined;
+use super::called::called;
 use super::layout::Layout;
 use super::opened::{is_reading, read_simulated};
 use super::patterns::{PatternArray, PatternSelection, Patterns};
@@ -72,6 +73,7 @@ struct Numbers {
 
 fn read_numbers(path: &Path, want: &Selection, patterns: usize) -> Result<Numbers, FileError> {
     let mut fields = Fields::open(path, want.decimal_comma)?;
+    let want = &*called(&mut fields, want)?;
     let name = readings_field(&fields, want)?;
     let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
     let paired = make_pairs(&mut fields, &name, want)?;

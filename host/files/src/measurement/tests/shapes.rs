@@ -135,3 +135,30 @@ fn one_pattern_is_a_measurement_however_many_axes_it_has() {
         assert_eq!(found.readings, Readings::Differential(vec![4.0]), "{shape}");
     }
 }
+
+#[test]
+fn fields_of_other_names_are_named() {
+    let members = [
+        ("volts.npy", npy_f64("(8,)", &PAIRS)),
+        ("shown.npy", rows()),
+        ("side.npy", npy_i32("()", &[2])),
+    ];
+    let of_names = |named: &str| read_members(&members, &field(named, as_is()));
+    for named in ["volts,h_row=shown,n=side", "n=side, h_row = shown, volts"] {
+        assert_eq!(of_names(named).unwrap().readings, Readings::Pairs(PAIRS.to_vec()), "{named}");
+    }
+    let refused = |named: &str| line(&of_names(named).unwrap_err(), "lab.npz");
+    let found = refused("volts,h_row=rows,n=side");
+    assert!(
+        found.contains("`rows` is not in the file, expected --field h_row= with one of"),
+        "{found}"
+    );
+    let found = refused("volts,rows=shown,n=side");
+    assert!(found.contains("no `h_row` in it"), "{found}");
+    // A sign of another name, in a text whose column has an equals sign in its own name.
+    let text = "U=,polarity\n5,1\n1,-1\n2,1\n3,-1\n4,1\n4,-1\n6,1\n0.5,-1\n";
+    let (_guard, path) = file("bench.csv", text.as_bytes());
+    let want = field("U=,sign=polarity", shown(Order::Natural));
+    let found = read(&path, &want).unwrap();
+    assert_eq!(found.readings, Readings::Pairs(vec![5.0, 1.0, 2.0, 3.0, 4.0, 4.0, 6.0, 0.5]));
+}
