@@ -289,7 +289,7 @@ fn what_is_no_measurement_file_is_named_for_what_it_is() {
         (b"\x00\x01\x02\x03", "found a file of another kind, expected measurements"),
         (
             b"k,d\n0,1.5\n",
-            "no `h_row` in it, found `k`, `d`; expected n, h_row, and y or d; or --shown ORDER",
+            "no `h_row` in it, found `k`, `d`; expected n, h_row, and y or d, or --field h_row=NAME",
         ),
         (b"\x93NUMPY\x01\x00", "damaged or cut short"),
         (b"\x89MCAP0\r\n", "found a recording (MCAP), expected measurements"),
