@@ -62,6 +62,10 @@ pub(crate) struct Options {
     patterns_first: bool,
     transpose: bool,
     decimal_comma: bool,
+    complements_first: bool,
+    inverted: bool,
+    shift: i32,
+    sweeps: Option<u32>,
     part: String,
     keep_leak: bool,
     no_flat_field: bool,
@@ -87,7 +91,12 @@ impl Options {
             shown: self.shown.as_deref().map(named).transpose()?,
             transpose: self.transpose,
             decimal_comma: self.decimal_comma,
-            remedy: Remedy::default(),
+            remedy: Remedy {
+                complements_first: self.complements_first,
+                inverted: self.inverted,
+                shift: self.shift,
+                sweeps: self.sweeps.unwrap_or(0),
+            },
         };
         Ok(SourceOptions {
             index: self.index.as_deref().map(|index| word::<Index>("index", index)).transpose()?,

@@ -145,6 +145,62 @@ def test_a_trace_is_the_measurement_of_its_readings(tmp_path):
     assert np.allclose(raw.d, of(scene), atol=1e-3)
 
 
+def test_a_table_in_memory_is_read_as_a_file_of_its_columns(tmp_path):
+    scene = asymmetric(N)
+    y, rows = of(scene, split=True), ns.order("zig-zag", N)
+    columns = {
+        "lit": y[0::2],
+        "dark": y[1::2],
+        "shown": rows,
+        "side": [N] * len(rows),
+        "note": ["ok"] * len(rows),
+    }
+    named = "lit,dark,h_row=shown,n=side"
+    found = ns.Measurement.from_table(columns, field=named)
+    assert np.allclose(found.d, of(scene)) and found.rows.tolist() == rows.tolist() and found.n == N
+    structured = np.zeros(len(rows), [("d", "f4"), ("h_row", "i4"), ("n", "u1"), ("word", "U3")])
+    structured["d"], structured["h_row"], structured["n"] = of(scene), rows, N
+    assert np.allclose(ns.Measurement.from_table(structured).d, of(scene), atol=1e-4)
+    # A row a reading, complements in any order.
+    every = np.random.default_rng(2).permutation(len(y))
+    loose = {"y": y[every], "h_row": np.repeat(rows, 2)[every], "sign": np.tile([1, -1], len(rows))[every]}
+    signed = ns.Measurement.from_table(loose, side=N)
+    assert np.allclose(ns.reconstruct(signed, method="hadamard"), scene, atol=1e-4)
+    np.savez(tmp_path / "a.npz", **{name: columns[name] for name in ("lit", "dark", "shown")}, side=N)
+    assert (ns.load(tmp_path / "a.npz", field=named).d == found.d).all()
+    with pytest.raises(ns.Error, match="^the table: `volts` is not in the file"):
+        ns.Measurement.from_table(columns, field="volts,h_row=shown,n=side")
+
+
+def test_readings_that_a_warning_names_are_read_by_an_option(tmp_path):
+    scene = asymmetric(N)
+    y = of(scene, split=True)
+    for options, changed in [
+        ({"complements_first": True}, y.reshape(-1, 2)[:, ::-1].ravel()),
+        ({"inverted": True}, -y),
+        ({"shift": -1}, np.concatenate([y[:1], y[:-1]])),
+        ({"sweeps": 3}, np.tile(y, 3)),
+    ]:
+        np.save(tmp_path / "y.npy", changed)
+        found = ns.load(tmp_path / "y.npy", shown="zig-zag", side=N, **options)
+        expected = of(scene)[: len(found.d)]
+        assert np.allclose(found.d, expected), options
+        assert not any(note.startswith("warning") for note in found.notes)
+
+
+def test_read_takes_files_and_traces(tmp_path):
+    scene = asymmetric(N)
+    y = of(scene, split=True)
+    np.save(tmp_path / "y.npy", y)
+    assert np.allclose(ns.read(tmp_path / "y.npy", shown="zig-zag").d, of(scene))
+    samples = np.concatenate([np.zeros(5), np.repeat(y, 6), np.zeros(4)])
+    np.savez(tmp_path / "adc.npz", CH1=samples, CH2=samples[::-1])
+    trace = ns.read(tmp_path / "adc.npz", samples=6, skip=5, count=len(y), field="CH1", shown="zig-zag")
+    assert np.allclose(trace.d, of(scene)) and "512 readings" in trace.notes[0]
+    with pytest.raises(ns.Error, match="adc.npz: .* expected n, h_row"):
+        ns.read(tmp_path / "adc.npz", samples=6, skip=5, count=len(y), field="CH1")
+
+
 def test_transposed_pixels_give_the_transposed_image():
     scene = asymmetric(N)
     m = ns.Measurement(d=of(scene.T, "natural"), rows="natural", n=N, transpose=True)

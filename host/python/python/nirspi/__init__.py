@@ -23,7 +23,7 @@ from .camera import Account, Camera, Frame
 from .camera_model import CameraModel
 from .hadamard import Hadamard, order, orders, patterns
 from .images import Image
-from .measurement import Measurement, load
+from .measurement import Measurement, load, read
 from .networks import deblur, deblur_models, enhance
 from .reconstruction import bases, methods, reconstruct
 from .recording import Recording
@@ -56,5 +56,6 @@ __all__ = [
     "orders",
     "patterns",
     "rain",
+    "read",
     "reconstruct",
 ]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import tempfile
 import warnings
+import zipfile
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -261,22 +263,37 @@ class Measurement:
         """
         if samples is None and trigger is None:
             raise Error("a trace without samples and trigger, expected one of them")
-        options = {
-            "samples": _arrays.count(samples, "samples", least=1),
-            "trigger": trigger,
-            "skip": _arrays.count(skip, "skip"),
-            "settle": _arrays.count(settle, "settle"),
-            "count": _arrays.count(count, "count", least=1),
-            "field": field,
-            "raw": raw,
-            "decimal_comma": bool(decimal_comma),
-        }
-        y, words, doubts, skipped = _nirspi.trace(os.fspath(path), options)
-        for doubt in doubts:
-            warnings.warn(doubt, RuntimeWarning, stacklevel=2)
+        y, words = _trace(path, samples, trigger, field, skip, settle, count, raw, decimal_comma)
         made = cls(y=y, rows=rows, n=n, readings=readings, transpose=transpose)
-        made.notes = [*words, *([skipped] if skipped else []), *made.notes]
+        made.notes = [*words, *made.notes]
         return made
+
+    @classmethod
+    def from_table(cls, table: Any, **source: Any) -> Measurement:
+        """The measurement of a table in memory, such as a data frame of pandas.
+
+        It is read as :func:`load` reads a file with these columns, by the same names, options and
+        refusals. Columns that hold words or dates are left out.
+
+        Parameters
+        ----------
+        table : mapping, data frame or structured array
+            Columns of one length by their names; one column may have a single number.
+        **source
+            The options of :func:`load`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import nirspi as ns
+        >>> scene = np.arange(64.0).reshape(8, 8)
+        >>> y = ns.Hadamard(8, split=True)(scene)
+        >>> table = {"lit": y[0::2], "dark": y[1::2], "comment": ["ok"] * 64}
+        >>> m = ns.Measurement.from_table(table, field="lit,dark", shown="natural")
+        >>> bool(np.allclose(m.d, ns.Hadamard(8)(scene)))
+        True
+        """
+        return _of_columns(_columns(table), "the table", source)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes an ``.npz`` that :func:`load` and ``nirspi reconstruct`` read.
@@ -301,6 +318,86 @@ def _numbers(values: Any, name: str) -> np.ndarray:
     return np.ascontiguousarray(_arrays.real(array, name), np.float64)
 
 
+def _trace(
+    path: str | os.PathLike[str],
+    samples: int | None,
+    trigger: str | None,
+    field: str | None,
+    skip: int,
+    settle: int,
+    count: int | None,
+    raw: str | None,
+    decimal_comma: bool,
+) -> tuple[np.ndarray, list[str]]:
+    """The readings of a trace, and what was found, in words. Doubts are warnings of the caller's caller."""
+    options = {
+        "samples": _arrays.count(samples, "samples", least=1),
+        "trigger": trigger,
+        "skip": _arrays.count(skip, "skip"),
+        "settle": _arrays.count(settle, "settle"),
+        "count": _arrays.count(count, "count", least=1),
+        "field": field,
+        "raw": raw,
+        "decimal_comma": bool(decimal_comma),
+    }
+    y, words, doubts, skipped = _nirspi.trace(os.fspath(path), options)
+    for doubt in doubts:
+        warnings.warn(doubt, RuntimeWarning, stacklevel=3)
+    return y, [*words, *([skipped] if skipped else [])]
+
+
+def _columns(table: Any) -> dict[str, np.ndarray]:
+    """The columns of numbers of a table."""
+    names = getattr(getattr(table, "dtype", None), "names", None)
+    if names is None:
+        names = getattr(table, "columns", None)
+    if names is None and hasattr(table, "keys"):
+        names = table.keys()
+    if names is None:
+        raise Error(f"table is {type(table).__name__}, expected columns by their names")
+    found: dict[str, np.ndarray] = {}
+    for name in names:
+        column = table[name]
+        if hasattr(column, "to_numpy") and str(getattr(column, "dtype", "")) in _NULLABLE:
+            column = column.to_numpy(dtype=np.float64, na_value=np.nan)
+        values = _arrays.array_of(column, f"column {name!r}")
+        if values.dtype.kind == "O":
+            try:
+                values = values.astype(np.float64)
+            except (TypeError, ValueError):
+                continue
+        if values.dtype.kind in "biufc":
+            found[str(name)] = values
+    return found
+
+
+# Types of pandas that have a value for "missing".
+_NULLABLE = frozenset(
+    ["Float32", "Float64", *(f"{kind}{bits}" for kind in ("Int", "UInt") for bits in (8, 16, 32, 64))]
+)
+
+
+def _of_columns(columns: dict[str, np.ndarray], name: str, source: dict[str, Any]) -> Measurement:
+    """The measurement of columns in memory, by the reader of files."""
+    options = source_options(**source)
+    renamed = [part.split("=", 1) for part in (source.get("field") or "").split(",") if "=" in part]
+    sides = {"n"} | {own.strip() for called, own in renamed if called.strip() == "n"}
+    for own in sides & columns.keys():
+        # A column repeats the number in every line.
+        if columns[own].size > 1 and (columns[own] == columns[own].flat[0]).all():
+            columns[own] = columns[own].reshape(-1)[0]
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "table.npz")
+        with zipfile.ZipFile(path, "w") as archive:
+            for column, values in columns.items():
+                with archive.open(f"{column}.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, np.asanyarray(values), allow_pickle=False)
+        try:
+            return _of_loaded(_nirspi.load(path, options))
+        except Error as error:
+            raise Error(str(error).replace(path, name)) from None
+
+
 def source_options(
     *,
     index: int | str | None = None,
@@ -311,6 +408,10 @@ def source_options(
     patterns_first: bool = False,
     transpose: bool = False,
     decimal_comma: bool = False,
+    complements_first: bool = False,
+    inverted: bool = False,
+    shift: int = 0,
+    sweeps: int | None = None,
     part: str = "magnitude",
     keep_leak: bool = False,
     no_flat_field: bool = False,
@@ -325,6 +426,10 @@ def source_options(
         "patterns_first": bool(patterns_first),
         "transpose": bool(transpose),
         "decimal_comma": bool(decimal_comma),
+        "complements_first": bool(complements_first),
+        "inverted": bool(inverted),
+        "shift": int(shift),
+        "sweeps": _arrays.count(sweeps, "sweeps", least=1),
         "part": part,
         "keep_leak": bool(keep_leak),
         "no_flat_field": bool(no_flat_field),
@@ -342,6 +447,10 @@ def load(
     patterns_first: bool = False,
     transpose: bool = False,
     decimal_comma: bool = False,
+    complements_first: bool = False,
+    inverted: bool = False,
+    shift: int = 0,
+    sweeps: int | None = None,
     part: str = "magnitude",
     keep_leak: bool = False,
     no_flat_field: bool = False,
@@ -362,7 +471,8 @@ def load(
     side : int, optional
         Side of the image, for a file that does not say it.
     field : str, optional
-        Name of the readings, if it is neither ``y`` nor ``d``.
+        Name of the readings, if it is neither ``y`` nor ``d``; or two names, ``"positive,negative"``.
+        Beside them, fields of other names: ``"volts,h_row=order,n=side,sign=polarity"``.
     readings : {"pairs", "halves", "single", "differences"}, optional
         How readings belong to patterns.
     patterns_first : bool
@@ -371,6 +481,14 @@ def load(
         Whether pixels are numbered down the columns, as in MATLAB.
     decimal_comma : bool
         Whether every comma of a text file is a decimal comma.
+    complements_first : bool
+        Whether each complement comes before its pattern.
+    inverted : bool
+        Whether all readings have the other sign, as behind an inverting amplifier.
+    shift : int
+        So many readings of the sweep are missing in front; if negative, so many came before it.
+    sweeps : int, optional
+        So many sweeps of the same patterns are in the file, one after another.
     part : {"magnitude", "real", "imaginary"}
         Of complex readings: "magnitude" keeps both parts (``d`` is complex).
     keep_leak : bool
@@ -407,11 +525,66 @@ def load(
         patterns_first=patterns_first,
         transpose=transpose,
         decimal_comma=decimal_comma,
+        complements_first=complements_first,
+        inverted=inverted,
+        shift=shift,
+        sweeps=sweeps,
         part=part,
         keep_leak=keep_leak,
         no_flat_field=no_flat_field,
     )
     return _of_loaded(_nirspi.load(os.fspath(path), options))
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    samples: int | None = None,
+    trigger: str | None = None,
+    skip: int = 0,
+    settle: int = 0,
+    count: int | None = None,
+    raw: str | None = None,
+    **source: Any,
+) -> Measurement:
+    """Reads whatever holds a measurement: a file or a recording as :func:`load` does, or a trace.
+
+    With ``samples`` or ``trigger`` the file is a trace: its samples make readings first, as in
+    :meth:`Measurement.from_trace`. What these readings are, the options of :func:`load` say.
+
+    Parameters
+    ----------
+    path : path
+    samples, trigger, skip, settle, count, raw
+        As of :meth:`Measurement.from_trace`.
+    **source
+        The options of :func:`load`. The ``field`` of a trace is that of its samples.
+
+    Examples
+    --------
+    >>> import numpy as np, os, tempfile
+    >>> import nirspi as ns
+    >>> scene = np.arange(64.0).reshape(8, 8)
+    >>> y = ns.Hadamard(8, split=True)(scene)
+    >>> folder = tempfile.mkdtemp()
+    >>> np.save(os.path.join(folder, "y.npy"), y)
+    >>> np.save(os.path.join(folder, "adc.npy"), np.repeat(y, 5))
+    >>> one = ns.read(os.path.join(folder, "y.npy"), shown="natural")
+    >>> two = ns.read(os.path.join(folder, "adc.npy"), samples=5, shown="natural")
+    >>> bool(np.allclose(one.d, two.d))
+    True
+    """
+    if samples is None and trigger is None:
+        of_trace = {"skip": skip, "settle": settle, "count": count, "raw": raw}
+        given = [name for name, value in of_trace.items() if value not in (None, 0)]
+        if given:
+            raise Error(f"{given[0]} without samples and trigger, expected one of them: it is of a trace")
+        return load(path, **source)
+    field, comma = source.pop("field", None), source.pop("decimal_comma", False)
+    y, words = _trace(path, samples, trigger, field, skip, settle, count, raw, comma)
+    made = _of_columns({"y": y}, os.fspath(path), source)
+    made.notes = [*words, *made.notes]
+    return made
 
 
 def _of_loaded(found: _nirspi.Loaded) -> Measurement:
