@@ -14,7 +14,7 @@
 //! * [`source`] reads measurements from a file, a recording or a capture, `nirspi-recon` reconstructs
 //!   images, [`imaging`] scales, enhances and judges them and gives warnings,
 //! * [`reconstruct`] makes an image or many of what was read, [`export`] writes a recording for other
-//!   programs.
+//!   programs, `inspect` says what is in a file and how to read it.
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and
 //! reads measurements, without typefaces or networks. The features `enhance` and `pictures` add these;
