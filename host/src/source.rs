@@ -327,7 +327,7 @@ impl Source {
     /// [`IntegrateError`] if its frames give no measurements.
     pub fn of_capture(capture: &Capture) -> Result<Self, IntegrateError> {
         let Capture { camera, setup, settling, integrated, counters, .. } = capture;
-        let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
+        let mut notes = integrated.warnings();
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
         let read = of_frames(integrated.measurements(setup, settling.as_ref(), false)?)?;
         Ok(Self {

@@ -1,11 +1,13 @@
 //! Makes measurements of frames: sums the frames of a run, corrects the settling leak, and assigns
 //! the rows.
 
+mod changes;
 mod phases;
 mod spread;
 
 use crate::response::Settling;
 use crate::setup::MeasurementSetup;
+pub(crate) use changes::Changes;
 use nirspi_recon::{LeakError, MeasurementError, Measurements, Sweep};
 use nirspi_wire::{Frame, FrameFlags};
 pub(crate) use phases::Phases;
@@ -34,6 +36,9 @@ pub struct KnownOfRun {
     pub noise_of_a_sweep: Option<f64>,
     /// What does not cancel in frames of less than four sweeps.
     pub(crate) offsets: Option<Arc<Offsets>>,
+    /// By how much the scene's readings changed, as a share of their variation from pattern to pattern; `None` where they
+    /// did not.
+    pub changed: Option<f64>,
 }
 
 impl Integrated {
@@ -95,13 +100,21 @@ impl Integrated {
         self.frames
     }
 
-    /// Warnings from the frames' flags, one line each.
+    /// Warnings from the frames' flags and from what the run tells, one line each.
     #[must_use]
-    pub fn warnings(&self) -> Vec<&'static str> {
-        [
+    pub fn warnings(&self) -> Vec<String> {
+        let changed = self.known.changed.filter(|_| self.frames > 1).map(|share| {
+            format!(
+                "the scene's readings changed by {:.0} % of their variation while they were taken: it moves, or its light \
+                 drifts; the picture of their sum is smeared, pictures of fewer frames are less so",
+                share * 100.0
+            )
+        });
+        let flags = [
             (
                 FrameFlags::OVER_RANGE,
-                "some samples were outside the ADC's range: too much light, or gain",
+                "some samples were outside the ADC's range: too much light, or gain, or charge from the LED lines right after \
+                 they change",
             ),
             (
                 FrameFlags::OVERFLOW,
@@ -114,8 +127,8 @@ impl Integrated {
         ]
         .into_iter()
         .filter(|(flag, _)| self.flags.contains(*flag))
-        .map(|(_, warning)| warning)
-        .collect()
+        .map(|(_, warning)| warning.to_owned());
+        flags.chain(changed).collect()
     }
 
     /// Mean ADC counts of one sample, for each pattern in the order shown; 0 without frames.
@@ -299,7 +312,7 @@ mod tests {
         with_frame(&[100, 20, -7, 3], FrameFlags::default(), |frame| alone.add(frame));
         assert_eq!(alone.noise(&setup), None);
         let noise_of_a_sweep = run.noise_of_a_sweep();
-        let alone = alone.of_run(&KnownOfRun { noise_of_a_sweep, offsets: None });
+        let alone = alone.of_run(&KnownOfRun { noise_of_a_sweep, ..KnownOfRun::default() });
         let (of_run, of_one) = (run.noise(&setup).unwrap(), alone.noise(&setup).unwrap());
         assert!((of_one / of_run - 3.0_f64.sqrt()).abs() < 1e-9, "{of_one} {of_run}");
         // A live view of one frame looks at the frame before.

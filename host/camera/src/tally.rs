@@ -4,7 +4,7 @@
 //! A recording gives the same tally as the capture that made it.
 
 use crate::account::{Arrival, Check, LossAccount};
-use crate::integrate::{Integrated, KnownOfRun, Phases};
+use crate::integrate::{Changes, Integrated, KnownOfRun, Phases};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError};
 use std::sync::Arc;
@@ -20,6 +20,7 @@ pub struct Tally {
     integrated: Integrated,
     /// Of sweeps that alternate.
     phases: Option<Phases>,
+    changes: Changes,
     /// How the first invalid frame contradicts the setup.
     misfit: Option<Misfit>,
     /// The number of frames that the camera reported at the end of the run.
@@ -70,6 +71,7 @@ impl Tally {
             account: LossAccount::new(),
             integrated: Integrated::new(setup),
             phases: (setup.differential && setup.alternating).then(Phases::default),
+            changes: Changes::default(),
             misfit: None,
             said: None,
             device_time_us: 0,
@@ -121,6 +123,7 @@ impl Tally {
         let received = self.account.frame(frame.sequence) == Arrival::Received;
         if received {
             self.integrated.add(frame);
+            self.changes.add(frame.samples.iter(), frame.sweeps);
             if let Some(phases) = &mut self.phases {
                 phases.add(frame.sequence, frame.sweeps, frame.samples.iter());
             }
@@ -211,6 +214,7 @@ impl Tally {
         let noise_of_a_sweep = self.integrated.noise_of_a_sweep();
         let offsets = self.phases.as_ref().zip(noise_of_a_sweep);
         let offsets = offsets.and_then(|(phases, noise)| phases.offsets(noise)).map(Arc::new);
-        KnownOfRun { noise_of_a_sweep, offsets }
+        let changed = noise_of_a_sweep.and_then(|noise| self.changes.share(noise));
+        KnownOfRun { noise_of_a_sweep, offsets, changed }
     }
 }

@@ -204,7 +204,8 @@ fn say(args: &Args, report: &CaptureReport<'_>) -> Result<ExitCode> {
             report.seconds,
             report.bytes as f64 / 1e6,
         ))?;
-        report.signal.iter().try_for_each(print::line)
+        report.signal.iter().try_for_each(print::line)?;
+        report.notes.iter().try_for_each(print::note)
     })?;
     if let Some(missing) = &report.missing {
         let received = count(frames.received, "received frame");

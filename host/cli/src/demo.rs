@@ -156,8 +156,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let model = optics.camera_model();
     let camera = shot.session.identity().clone();
     let captured = &shot.capture;
-    let mut notes: Vec<String> =
-        captured.integrated.warnings().into_iter().map(str::to_owned).collect();
+    let mut notes = captured.integrated.warnings();
     let setup = &captured.setup;
     let leak = captured.settling.as_ref().map(|s| s.leak(setup.clocks_per_pattern, setup.blanked));
     let leak = leak.transpose()?;

@@ -1,5 +1,7 @@
 //! A target that moves before the projector.
 
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
 use nirspi_optics::{CameraModel, Motion, MovingTarget, Projector, Scene};
 use proptest::prelude::*;
 

@@ -347,7 +347,7 @@ impl Imaging {
         shared.passed(Passed::Reconstructed, look.arrived);
         let white_counts = white.follow(White::Brightest.level(&image));
         let frame_warnings = look.sum.warnings();
-        let mut all: Vec<String> = frame_warnings.iter().map(|&text| text.to_owned()).collect();
+        let mut all = frame_warnings.clone();
         let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
         let mut half_width = None;
         if let Some(given) = for_networks.filter(|_| white_counts > 0.0) {

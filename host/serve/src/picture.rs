@@ -58,7 +58,7 @@ pub struct Picture {
     /// Reasons not to trust the images: the frames' flags, and the results of the learned stages.
     pub warnings: Vec<String>,
     /// The warnings of the frames' flags, for the image itself.
-    pub frame_warnings: Vec<&'static str>,
+    pub frame_warnings: Vec<String>,
     /// Short forms of the learned stages' warnings, for the enhanced image itself.
     pub short_warnings: Vec<&'static str>,
 }

@@ -28,7 +28,8 @@ pub(crate) fn of_sum(
     match tally.integrated() {
         integrated if integrated.frames() > 0 => {
             let flat_field = flat_field(options, recording);
-            of_frames(path, options, recording, integrated, tally, &flat_field)
+            let integrated = integrated.clone().of_run(&tally.known());
+            of_frames(path, options, recording, &integrated, tally, &flat_field)
         }
         _ => Err(no_frame(path, tally)),
     }
@@ -79,7 +80,7 @@ fn of_frames(
     let counters = tally.account().counters();
     let Recording { setup, settling, .. } = recording;
     let End { cut_short, account, .. } = recording.end();
-    let mut notes: Vec<String> = integrated.warnings().into_iter().map(str::to_owned).collect();
+    let mut notes = integrated.warnings();
     let mut lacks = Vec::new();
     lacks.extend(cut_short.as_ref().map(|reason| format!("cut short or damaged: {reason}")));
     if let Some(account) = account {

@@ -139,3 +139,29 @@ fn an_emulated_board_finds_the_fpga_behind_its_tunnel() {
     drop(listener);
     bench.run(&["virtual", "--tunnel", &address]).failed(1, &[&address, "no emulator there"]);
 }
+
+/// At 0.5 m/s a letter of 43 mm goes on by 6.7 pixels in 20 ms.
+#[test]
+fn a_target_that_moves_is_simulated_and_its_smear_is_said() {
+    let bench = Bench::new();
+    let capture = |name: &str, motion: &[&str]| {
+        let all = ["capture", "--camera", "virtual", "--no-calibration", "--adc-latency", "6"];
+        let all = [&all[..], &["--light", "20ms", "--out", name], motion].concat();
+        bench.run(&all).succeeded().stdout
+    };
+    let still = capture("still.mcap", &[]);
+    assert!(!still.contains("readings changed"), "{still}");
+    for motion in [&["--target-speed", "0.5"][..], &["--target-turning", "-2000"]] {
+        let name = format!("{}.mcap", motion[0].trim_start_matches('-'));
+        let said = capture(&name, motion);
+        assert!(said.contains("the scene's readings changed by"), "{motion:?}: {said}");
+        let made = bench.run(&["reconstruct", &name, "--out", "out"]).succeeded();
+        assert!(made.stdout.contains("the scene's readings changed by"), "{}", made.stdout);
+    }
+    let down = ["--target-speed", "0.5", "--target-direction", "90"];
+    capture("down.mcap", &down);
+    let bytes = |name| std::fs::read(bench.path(name)).unwrap();
+    assert_ne!(bytes("down.mcap"), bytes("target-speed.mcap"));
+    let fast = ["capture", "--camera", "virtual", "--target-speed", "200", "--frames", "1"];
+    bench.run(&fast).failed(2, &["target speed in m/s is 200, expected 0 to 100"]);
+}

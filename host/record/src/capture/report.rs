@@ -45,6 +45,9 @@ pub struct CaptureReport<'r> {
     pub frames_per_s: f64,
     /// What the camera's signal meter saw; `null` for a single frame.
     pub signal: Option<Signal>,
+    /// What is wrong with the readings, one line each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// The ADC latency that was used.
     pub adc_latency_clocks: u8,
     /// Whether readings are corrected for the leak.
@@ -91,6 +94,7 @@ impl<'r> CaptureReport<'r> {
             seconds,
             frames_per_s: counters.received as f64 / seconds,
             signal: captured.status.as_ref().and_then(Signal::of),
+            notes: captured.integrated.warnings(),
             adc_latency_clocks: captured.setup.adc_latency,
             calibrated: captured.settling.is_some(),
             calibration: choice.used(captured).cloned(),

@@ -377,7 +377,7 @@ impl Run {
             setup: self.setup,
             settling: self.settling,
             calibration_problem: self.calibration_problem,
-            integrated: self.tally.integrated().clone(),
+            integrated: self.tally.integrated().clone().of_run(&self.tally.known()),
             counters: account.counters(),
             failed_checks: account.failed_checks(),
             unknown_packets: self.tally.unknown_packets(),

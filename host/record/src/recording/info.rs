@@ -43,6 +43,8 @@ pub struct RecordingInfo {
     pub patterns: usize,
     /// Whether each pattern is followed by its complement.
     pub differential: bool,
+    /// Whether sweeps differ so that the faults of LEDs and lines cancel in every four.
+    pub alternating: bool,
     /// Sweeps summed into a frame.
     pub sweeps: u32,
     /// ADC clocks for which each pattern is shown.
@@ -97,6 +99,7 @@ impl RecordingInfo {
             patterns: setup.rows.len(),
             order: setup.order,
             differential: setup.differential,
+            alternating: setup.differential && setup.alternating,
             sweeps: setup.sweeps,
             clocks_per_pattern: setup.clocks_per_pattern,
             blanked: setup.blanked,
@@ -123,8 +126,11 @@ impl fmt::Display for RecordingInfo {
         }
         let (board, serial) = (camera.board.escape_debug(), camera.serial.escape_debug());
         writeln!(f, "camera {board} {serial}, wire protocol {}", camera.protocol)?;
-        let pairs =
-            if self.differential { "pairs of a pattern and its complement" } else { "patterns" };
+        let pairs = match (self.differential, self.alternating) {
+            (true, true) => "pairs of a pattern and its complement, by turns,",
+            (true, false) => "pairs of a pattern and its complement",
+            (false, _) => "patterns",
+        };
         let order = self.order.escape_debug();
         let (sweeps, latency) = (count(u64::from(self.sweeps), "sweep"), self.adc_latency);
         writeln!(f, "{} {pairs} in {order} order, {sweeps} a frame", self.patterns)?;
