@@ -245,7 +245,7 @@ fn of_patterns(path: &Path, array: &Array, arrays: &[Array]) -> Finding {
             .some("--field", (!["y", "d"].contains(&&*own.name)).then_some(&own.name)),
         None => Command::new("reconstruct", Path::new("READINGS")),
     };
-    let size_words = (!is_known).then_some("HEIGHTxWIDTH");
+    let size_words = (!is_known).then_some("HxW");
     let line = begun
         .option("--matrix", path.display())
         .some("--matrix-field", name.filter(|_| !is_default))
