@@ -154,7 +154,7 @@ impl Inspection {
             return Err(FileError::kind(path, "no finite number", "readings").into());
         }
         let (is_text, decimal_comma) = (contents.is_text(), contents.decimal_comma());
-        let is_long = contents.arrays().iter().any(ways::is_long);
+        let is_long = contents.arrays().iter().any(other::is_long);
         let found = Self::examined(path, contents);
         if is_text && !is_long && !decimal_comma && found.fitting().is_empty() {
             // One comma a line separates two columns, or is the decimal comma of one.

@@ -1,7 +1,6 @@
 //! What a file holds beside readings, or instead: traces and patterns of a user's own.
 
 use super::trial::Guess;
-use super::ways::{NO_READINGS, is_long};
 use super::{command, command::Command};
 use crate::files::contents::{Array, Contents};
 use crate::files::trace::{self, Cut};
@@ -9,6 +8,25 @@ use nirspi_recon::Size;
 use nirspi_recon::words::count_of;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+
+/// Fields that are no readings.
+pub(super) const NO_READINGS: [&str; 12] = [
+    "n",
+    "h_row",
+    "sign",
+    "simulated",
+    "noise",
+    "recon",
+    "image",
+    "images",
+    "provenance",
+    "patterns",
+    "matrix",
+    "trigger",
+];
+
+/// The most readings of a sweep: pairs of the patterns of 256 x 256 pixels.
+const MOST_READINGS: usize = 2 << 16;
 
 /// Share of a trigger's samples near one of its two levels, and how near: in shares of its range.
 const AT_LEVELS: f64 = 0.98;
@@ -292,4 +310,9 @@ pub(super) fn unexplained(
         .option("--out", "out/")
         .line();
     Some(Finding { what: what.to_owned(), commands: vec![matrix] })
+}
+
+/// Whether an array has more numbers along one axis than a sweep has readings.
+pub(super) fn is_long(array: &Array) -> bool {
+    matches!(array.axes()[..], [count] if count > MOST_READINGS)
 }

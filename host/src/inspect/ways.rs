@@ -1,6 +1,6 @@
 //! The ways in which the readings of a file can be read, and their trial.
 
-use super::other::{Trace, is_patterns};
+use super::other::{NO_READINGS, Trace, is_long, is_patterns};
 use super::trial::{Guess, Judge, Verdict};
 use super::{FileError, command};
 use crate::files::contents::{Array, Contents, of_readings};
@@ -11,30 +11,11 @@ use nirspi_recon::{Order, Rows, Side};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Fields that are no readings.
-pub(super) const NO_READINGS: [&str; 12] = [
-    "n",
-    "h_row",
-    "sign",
-    "simulated",
-    "noise",
-    "recon",
-    "image",
-    "images",
-    "provenance",
-    "patterns",
-    "matrix",
-    "trigger",
-];
-
 /// The most fields of which two are tried as patterns and complements.
 const MOST_FIELDS: usize = 4;
 
 /// How many patterns a recording may have begun early or late.
 const SHIFTS: [i32; 4] = [1, -1, 2, -2];
-
-/// The most readings of a sweep: pairs of the patterns of 256 x 256 pixels.
-const MOST_READINGS: usize = 2 << 16;
 
 /// Fewest readings of a measurement.
 const LEAST: usize = 4;
@@ -470,11 +451,6 @@ fn default_form(arrays: &[Array], field: Option<&str>) -> Form {
 
 fn array_of<'a>(arrays: &'a [Array], name: &str) -> Option<&'a Array> {
     arrays.iter().find(|array| array.name == name)
-}
-
-/// Whether an array has more numbers along one axis than a sweep has readings.
-pub(super) fn is_long(array: &Array) -> bool {
-    matches!(array.axes()[..], [count] if count > MOST_READINGS)
 }
 
 /// Arrays that may be readings.

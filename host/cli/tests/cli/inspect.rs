@@ -184,7 +184,8 @@ fn patterns_traces_and_recordings_are_named_for_what_they_are() {
     let volts: Vec<f32> = (0..40).map(|k| ((k * 31) % 17) as f32 + 0.5).collect();
     bench.write("both.npz", &npz(&[("phi", &[40, 180], &weights), ("volts", &[40], &volts)]));
     let said = bench.run(&["inspect", "both.npz"]).succeeded().stdout;
-    let command = "nirspi reconstruct both.npz --field volts --matrix both.npz --matrix-field phi --size HxW";
+    let command =
+        "nirspi reconstruct both.npz --field volts --matrix both.npz --matrix-field phi --size HxW";
     assert!(
         said.contains("40 patterns of 180 pixels in `phi`") && said.contains(command),
         "{said}"
