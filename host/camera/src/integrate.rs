@@ -232,7 +232,7 @@ impl Newest {
     /// A sum without frames.
     #[must_use]
     pub fn new(setup: &MeasurementSetup) -> Self {
-        let alternating = setup.differential && setup.alternating;
+        let alternating = setup.alternates();
         Self { frames: VecDeque::new(), total: Integrated::new(setup), before: None, alternating }
     }
 

@@ -105,6 +105,12 @@ impl MeasurementSetup {
         Self { clocks_per_pattern, blanked, ..self }
     }
 
+    /// Whether the faults of LEDs and lines cancel in every four sweeps.
+    #[must_use]
+    pub fn alternates(&self) -> bool {
+        self.differential && self.alternating
+    }
+
     /// Number of ADC samples summed in each slot.
     #[must_use]
     pub fn window(&self) -> u16 {

@@ -70,7 +70,7 @@ impl Tally {
             differential: setup.differential,
             account: LossAccount::new(),
             integrated: Integrated::new(setup),
-            phases: (setup.differential && setup.alternating).then(Phases::default),
+            phases: setup.alternates().then(Phases::default),
             changes: Changes::default(),
             misfit: None,
             said: None,

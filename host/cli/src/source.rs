@@ -52,7 +52,7 @@ pub struct SourceArgs {
     /// All readings have the other sign, as behind an inverting amplifier
     #[arg(long)]
     pub inverted: bool,
-    /// So many readings of the sweep are missing in front of those of the file; if negative, so many came before the sweep
+    /// The file lacks the first K readings of the sweep; with -K, its first K readings were taken before the sweep
     #[arg(
         long,
         value_name = "K",
@@ -61,7 +61,7 @@ pub struct SourceArgs {
         hide_default_value = true
     )]
     pub shift: i32,
-    /// The file holds so many sweeps of the same patterns, one after another, and no h_row. Their mean is used
+    /// The file holds K sweeps of the same patterns, one after another, and no h_row. Their mean is used
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     pub sweeps: Option<u32>,
     /// Which part of complex readings to show

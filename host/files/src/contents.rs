@@ -45,7 +45,7 @@ pub struct Array {
 pub struct Look {
     /// Number of numbers.
     pub count: usize,
-    /// The least and the greatest number; `None` if there is none.
+    /// The least and the greatest of the numbers; `None` for an array without a finite one.
     pub range: Option<[f64; 2]>,
     /// Number of NaN.
     pub missing: usize,

@@ -2,10 +2,10 @@
 //!
 //! All LEDs go on and off every [`HALF_PERIOD`] ADC clocks (pattern 0 and its complement, in sweeps
 //! that alternate). Every second period has all lines inverted, so that the charge which they inject
-//! into the receiver cancels. The mean of the periods is the camera's step response `s[n]`, `n` clocks after the step: 0 before the
-//! light has passed LEDs, amplifier and ADC, and 1 when the light has settled. The clock at which
-//! the response leaves 0 is the latency. The leak, a pattern's light in later slots, follows from
-//! the response for any dwell and blanking.
+//! into the receiver cancels. The mean of the periods is the camera's step response `s[n]`, `n`
+//! clocks after the step: 0 before the light has passed LEDs, amplifier and ADC, and 1 when the
+//! light has settled. The clock at which the response leaves 0 is the latency. The leak, a pattern's
+//! light in later slots, follows from the response for any dwell and blanking.
 //!
 //! Latency and response belong to the instrument and not to the scene. Both are measured once,
 //! against a white sheet, and kept ([`KeptCalibration`](super::KeptCalibration)).

@@ -88,7 +88,8 @@ impl Phases {
 pub(crate) struct Offsets([Vec<f64>; CYCLE as usize]);
 
 impl Offsets {
-    /// Takes from the sums of frames, with so many sweeps that began at each place, what they have too much.
+    /// Subtracts the offsets from sums of frames. `sweeps` is the number of summed sweeps by the place at which their
+    /// frames began.
     pub(super) fn correct(&self, sums: &mut [f64], sweeps: [u64; CYCLE as usize]) {
         for (offsets, sweeps) in self.0.iter().zip(sweeps) {
             for (sum, offset) in sums.iter_mut().zip(offsets) {

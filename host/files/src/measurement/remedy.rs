@@ -10,10 +10,10 @@ pub struct Remedy {
     pub complements_first: bool,
     /// All readings have the other sign: more light gives a lower reading.
     pub inverted: bool,
-    /// So many readings of the sweep are missing in front of the file's; if negative, so many came before the
-    /// sweep.
+    /// Number of first readings of the sweep that the file lacks; if negative, number of readings in the file that
+    /// were taken before the sweep.
     pub shift: i32,
-    /// So many sweeps came one after another; 0 is one sweep.
+    /// Number of sweeps in the file, one after another; 0 is one sweep.
     pub sweeps: u32,
 }
 

@@ -486,9 +486,9 @@ def load(
     inverted : bool
         Whether all readings have the other sign, as behind an inverting amplifier.
     shift : int
-        So many readings of the sweep are missing in front; if negative, so many came before it.
+        Number of first readings of the sweep that the file lacks; -K: K readings came before the sweep.
     sweeps : int, optional
-        So many sweeps of the same patterns are in the file, one after another.
+        Number of sweeps of the same patterns in the file, one after another.
     part : {"magnitude", "real", "imaginary"}
         Of complex readings: "magnitude" keeps both parts (``d`` is complex).
     keep_leak : bool
