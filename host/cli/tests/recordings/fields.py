@@ -46,7 +46,10 @@ def recording(path, frames):
     assert (identity["adc_hz"], identity["adc_bits"], identity["wavelength_nm"]) == (125_000_000, 14, 1550), identity
     assert identity["firmware"] and identity["gateware"] and "depth" in identity["capabilities"], identity
     assert account == {"received": frames, "lost": 0, "corrupt": 0, "late": 0, "asked": frames, "made": frames, "missing": None}
-    assert parts["settling"]["adc_latency"] == 6 and len(parts["settling"]["response"]) == 6, parts["settling"]
+    # How many samples the response has depends on the noise: it ends where it cannot be told from 1.
+    response = parts["settling"]["response"]
+    assert parts["settling"]["adc_latency"] == 6, parts["settling"]
+    assert abs(response[0] - 0.53) < 0.05 and 0.97 < response[-1] < 1.02, parts["settling"]
     assert parts["run"] == 1 and parts["setup"]["order"] == "cake-cutting", parts
     return parts, [m.log_time for _, channel, m in found if channel.topic == "/wire"]
 
