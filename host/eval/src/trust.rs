@@ -63,7 +63,7 @@ pub struct Settings {
     pub stacks: Vec<Stack>,
     /// Folder of other weights, `<network>.safetensors`.
     pub weights: Option<PathBuf>,
-    /// The most images of each stack of characters, a third of those of natural scenes.
+    /// The most images of each stack of characters. Of natural scenes all are taken.
     pub count: usize,
     /// Seed of the choice of images, of their blur and of the noise.
     pub seed: u64,
@@ -116,8 +116,8 @@ impl Settings {
 
     /// The images of one half.
     fn images(&self, half: Half) -> Result<Characters> {
-        // Natural scenes are the harder half of what a camera sees.
-        let count = |stack: &str| self.count * if stack == NATURAL { 3 } else { 1 };
+        // Natural scenes are the harder half of what a camera sees: all that there are.
+        let count = |stack: &str| if stack == NATURAL { usize::MAX } else { self.count };
         let images = Characters::of_each(&self.stacks, &self.groups(half)?, &count, self.seed);
         match images.is_empty() {
             true => Err(EvalError::Content("no image that training has not seen".to_owned())),

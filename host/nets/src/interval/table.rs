@@ -41,7 +41,7 @@ const RIDGE: f64 = 1e-4;
 /// The truth's pixels with the largest steps to their neighbours are its edges: this share.
 const EDGES: f64 = 0.2;
 /// The least share of the pixels at edges that lies within the half-width of [`LEVEL`].
-const AT_EDGES: f64 = 0.92;
+const AT_EDGES: f64 = 0.94;
 /// The least number of images of one kind for a factor of their own in a cell. With fewer, the cell
 /// has the factor of all images of the kind.
 const ENOUGH: usize = 12;
