@@ -1,5 +1,5 @@
 //! Pictures of a letter that crosses the field: one of all light between two pictures, one of a short frame, and one of
-//! short frames that start from those before.
+//! short frames that are added along the letter's way.
 //!
 //! `cargo run --release -p nirspi-virtual --example moving [SPEED_M_PER_S [SWEEPS [SHARE]]]`. A picture counts while the letter
 //! is whole in the field. PSNR is against what the LEDs see in the middle of the frame, in shares of a white sheet.
@@ -10,8 +10,9 @@ use nirspi::recording::{Recording, RecordingError, Target, hear_recording};
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
+use nirspi_follow::{FollowSettings, Timed, follow};
 use nirspi_optics::Motion;
-use nirspi_recon::reconstruct::{Method, ReconstructError, Reconstruction};
+use nirspi_recon::reconstruct::{Method, Reconstruction};
 use nirspi_recon::{Measurements, Order};
 use nirspi_virtual::{CameraModel, MemoryLink, VirtualOptics, calibrate_against_white};
 use std::error::Error;
@@ -90,42 +91,40 @@ fn main() -> Result<(), Box<dyn Error>> {
         |at: &usize| target.as_ref().is_none_or(|t| t.pose(times[*at]).x_mm.abs() < whole_mm + 6.0);
     let shown: Vec<usize> =
         (0..PICTURES).map(|n| n * frames_a_picture + frames_a_picture - 1).filter(counts).collect();
-    let report = |name: &str, values: &[f64], ms: f64| {
+    let report = |name: &str, values: &[f64]| {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-        println!(
-            "{name}: mean {mean:.1} dB, least {least:.1} dB, {} pictures, {ms:.1} ms a frame",
-            values.len()
-        );
+        println!("{name}: mean {mean:.1} dB, least {least:.1} dB, {} pictures", values.len());
     };
     let settings = nirspi_nets::prior::settings();
     // The time of a frame's packet is that of its first light; the middle is later.
     let middle = frame_s / 2.0;
     for method in [Method::TIKHONOV, Method::PRIOR] {
         let ready = method.prepare(&settings)?;
-        let begun = Instant::now();
-        let alone: Vec<f64> = shown
-            .iter()
-            .map(|&at| Ok(psnr(&ready.reconstruct(&measured[at])?, at, middle)))
-            .collect::<Result<_, ReconstructError>>()?;
-        report(
-            &format!("{}, one frame", method.name()),
-            &alone,
-            begun.elapsed().as_secs_f64() * 1e3 / alone.len() as f64,
-        );
-        let begun = Instant::now();
-        let mut past = ready.begin_video()?.ok_or("no video")?;
-        let mut with_past = Vec::new();
-        for (at, frame) in measured.iter().enumerate() {
-            let made = ready.next_frame(&mut past, frame)?;
-            if shown.contains(&at) {
-                with_past.push(psnr(&made, at, middle));
-            }
+        let (mut alone, mut together) = (Vec::new(), Vec::new());
+        let (mut added, mut seconds) = (0, 0.0);
+        let mut before = None;
+        for &at in &shown {
+            alone.push(psnr(&ready.reconstruct(&measured[at])?, at, middle));
+            let begun = Instant::now();
+            let frames: Vec<Timed<'_>> = (at + 1 - frames_a_picture..=at)
+                .map(|at| Timed { frame: &measured[at], at: times[at] / frame_s })
+                .collect();
+            let found = follow(&frames, &FollowSettings { before, ..FollowSettings::default() })?;
+            let made = ready.reconstruct(&found.measurements)?;
+            seconds += begun.elapsed().as_secs_f64();
+            together.push(psnr(&made, at, middle));
+            added += found.frames;
+            before = Some(found.velocity_px);
         }
-        report(
-            &format!("{}, with the past", method.name()),
-            &with_past,
-            begun.elapsed().as_secs_f64() * 1e3 / measured.len() as f64,
+        let name = method.name();
+        report(&format!("{name}, one frame"), &alone);
+        report(&format!("{name}, frames added along the way"), &together);
+        let pictures = shown.len() as f64;
+        println!(
+            "    {:.1} frames and {:.1} ms a picture",
+            added as f64 / pictures,
+            1e3 * seconds / pictures
         );
     }
     let ready = Method::PRIOR.prepare(&settings)?;
@@ -146,6 +145,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         let made = ready.reconstruct(&sum.measurements(&setup, Some(&settling), false)?)?;
         all.push(psnr(&made, at, middle - frame_s * (frames_a_picture - 1) as f64 / 2.0));
     }
-    report("prior, all light between two pictures", &all, 0.0);
+    report("prior, all light between two pictures", &all);
     Ok(())
 }
