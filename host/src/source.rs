@@ -22,6 +22,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 mod halves;
+mod moving;
 mod recording;
 mod several;
 
@@ -327,9 +328,10 @@ impl Source {
     /// [`IntegrateError`] if its frames give no measurements.
     pub fn of_capture(capture: &Capture) -> Result<Self, IntegrateError> {
         let Capture { camera, setup, settling, integrated, counters, .. } = capture;
-        let mut notes = integrated.warnings();
+        let (measurements, mut notes) =
+            moving::measurements(integrated, setup, settling.as_ref(), false)?;
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
-        let read = of_frames(integrated.measurements(setup, settling.as_ref(), false)?)?;
+        let read = of_frames(measurements)?;
         Ok(Self {
             measurements: read.measurements,
             imaginary: None,

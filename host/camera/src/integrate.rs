@@ -39,6 +39,8 @@ pub struct KnownOfRun {
     /// By how much the scene's readings changed, as a share of their variation from pattern to pattern; `None` where they
     /// did not.
     pub changed: Option<f64>,
+    /// The newest frames of a scene that changed, each alone, with their numbers in the run.
+    pub newest: Vec<(u64, Arc<Integrated>)>,
 }
 
 impl Integrated {
@@ -60,6 +62,18 @@ impl Integrated {
         }
     }
 
+    /// A sum of the same patterns without frames.
+    pub(crate) fn empty(&self) -> Self {
+        Self::of_patterns(self.sums.len())
+    }
+
+    /// The same without frames, in the same memory.
+    pub(crate) fn emptied(self) -> Self {
+        let mut sums = self.sums;
+        sums.fill(0);
+        Self { sums, ..Self::of_patterns(0) }
+    }
+
     /// Number of patterns of a sweep.
     #[must_use]
     pub fn patterns(&self) -> usize {
@@ -74,7 +88,13 @@ impl Integrated {
 
     /// Adds one frame that [fits](Self::fits).
     pub fn add(&mut self, frame: &Frame<'_>) {
-        self.add_sums(frame.samples.iter(), u64::from(frame.sweeps));
+        self.spread.add(frame.samples.iter(), u64::from(frame.sweeps));
+        self.add_alone(frame);
+    }
+
+    /// Adds a frame to a sum that does not ask what differs between its frames.
+    pub(crate) fn add_alone(&mut self, frame: &Frame<'_>) {
+        self.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
         self.places[phases::place_of(frame.sequence, frame.sweeps)] += u64::from(frame.sweeps);
         self.flags = self.flags.with(frame.flags);
     }
@@ -103,13 +123,33 @@ impl Integrated {
     /// Warnings from the frames' flags and from what the run tells, one line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        let changed = self.known.changed.filter(|_| self.frames > 1).map(|share| {
+        let smeared = self.changed().map(|changed| {
+            format!("{changed}; the picture of their sum is smeared, pictures of fewer frames are less so")
+        });
+        self.warnings_of_flags().into_iter().chain(smeared).collect()
+    }
+
+    /// What is said of a scene that changed while the frames were taken; `None` if it did not, or of one frame.
+    #[must_use]
+    pub fn changed(&self) -> Option<String> {
+        self.known.changed.filter(|_| self.frames > 1).map(|share| {
             format!(
                 "the scene's readings changed by {:.0} % of their variation while they were taken: it moves, or its light \
-                 drifts; the picture of their sum is smeared, pictures of fewer frames are less so",
+                 drifts",
                 share * 100.0
             )
-        });
+        })
+    }
+
+    /// The newest frames of the run, each alone with its number, if the scene [changed](Self::changed); otherwise none.
+    pub fn newest(&self) -> impl Iterator<Item = (u64, Self)> + '_ {
+        let frames = self.known.newest.iter().filter(|_| self.frames > 1);
+        frames.map(|(number, frame)| (*number, Self::clone(frame).of_run(&self.known)))
+    }
+
+    /// Warnings from the frames' flags, one line each.
+    #[must_use]
+    pub fn warnings_of_flags(&self) -> Vec<String> {
         let flags = [
             (
                 FrameFlags::OVER_RANGE,
@@ -128,7 +168,7 @@ impl Integrated {
         .into_iter()
         .filter(|(flag, _)| self.flags.contains(*flag))
         .map(|(_, warning)| warning.to_owned());
-        flags.chain(changed).collect()
+        flags.collect()
     }
 
     /// Mean ADC counts of one sample, for each pattern in the order shown; 0 without frames.

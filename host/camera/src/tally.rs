@@ -7,8 +7,13 @@ use crate::account::{Arrival, Check, LossAccount};
 use crate::integrate::{Changes, Integrated, KnownOfRun, Phases};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use thiserror::Error;
+
+/// Number of frames that are kept alone, for a scene that moves: at 24 pictures a second and frames of 1.5 ms, those of one
+/// picture.
+const NEWEST: usize = 28;
 
 /// The sum and the account of a run's packets.
 #[derive(Debug, Clone)]
@@ -21,6 +26,8 @@ pub struct Tally {
     /// Of sweeps that alternate.
     phases: Option<Phases>,
     changes: Changes,
+    /// The newest frames, each alone, with their numbers.
+    newest: VecDeque<(u64, Arc<Integrated>)>,
     /// How the first invalid frame contradicts the setup.
     misfit: Option<Misfit>,
     /// The number of frames that the camera reported at the end of the run.
@@ -72,6 +79,7 @@ impl Tally {
             integrated: Integrated::new(setup),
             phases: setup.alternates().then(Phases::default),
             changes: Changes::default(),
+            newest: VecDeque::new(),
             misfit: None,
             said: None,
             device_time_us: 0,
@@ -123,12 +131,22 @@ impl Tally {
         let received = self.account.frame(frame.sequence) == Arrival::Received;
         if received {
             self.integrated.add(frame);
+            self.keep(frame);
             self.changes.add(frame.samples.iter(), frame.sweeps);
             if let Some(phases) = &mut self.phases {
                 phases.add(frame.sequence, frame.sweeps, frame.samples.iter());
             }
         }
         received
+    }
+
+    /// Keeps a frame alone, in the place of the oldest one that is kept.
+    fn keep(&mut self, frame: &Frame<'_>) {
+        let oldest = if self.newest.len() < NEWEST { None } else { self.newest.pop_front() };
+        let sums = oldest.and_then(|(_, oldest)| Arc::into_inner(oldest));
+        let mut alone = sums.map_or_else(|| self.integrated.empty(), Integrated::emptied);
+        alone.add_alone(frame);
+        self.newest.push_back((frame.sequence.into(), Arc::new(alone)));
     }
 
     fn misfit_of(&self, frame: &Frame<'_>) -> Option<Misfit> {
@@ -215,6 +233,7 @@ impl Tally {
         let offsets = self.phases.as_ref().zip(noise_of_a_sweep);
         let offsets = offsets.and_then(|(phases, noise)| phases.offsets(noise)).map(Arc::new);
         let changed = noise_of_a_sweep.and_then(|noise| self.changes.share(noise));
-        KnownOfRun { noise_of_a_sweep, offsets, changed }
+        let newest = changed.map(|_| self.newest.iter().cloned().collect()).unwrap_or_default();
+        KnownOfRun { noise_of_a_sweep, offsets, changed, newest }
     }
 }

@@ -1,5 +1,6 @@
 //! Reads the frames of a recording as measurements: their sum, or each of them.
 
+use super::moving;
 use super::several::fits_together;
 use super::{NOT_CALIBRATED, Source, SourceError, SourceOptions, not_whole};
 use crate::calibration::KeptFlatField;
@@ -80,7 +81,9 @@ fn of_frames(
     let counters = tally.account().counters();
     let Recording { setup, settling, .. } = recording;
     let End { cut_short, account, .. } = recording.end();
-    let mut notes = integrated.warnings();
+    let (measurements, mut notes) =
+        moving::measurements(integrated, setup, settling.as_ref(), options.keep_leak)
+            .map_err(|problem| SourceError::Integrate { path: path.to_owned(), problem })?;
     let mut lacks = Vec::new();
     lacks.extend(cut_short.as_ref().map(|reason| format!("cut short or damaged: {reason}")));
     if let Some(account) = account {
@@ -93,9 +96,6 @@ fn of_frames(
     if settling.is_none() {
         notes.push(NOT_CALIBRATED.to_owned());
     }
-    let measurements = integrated
-        .measurements(setup, settling.as_ref(), options.keep_leak)
-        .map_err(|problem| SourceError::Integrate { path: path.to_owned(), problem })?;
     let read = super::of_frames(measurements)
         .map_err(|problem| SourceError::Measurements { path: path.to_owned(), problem })?;
     let (dropouts, not_read, frames) = (Vec::new(), Vec::new(), Some(counters));
