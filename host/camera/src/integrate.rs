@@ -123,16 +123,25 @@ impl Integrated {
     /// Warnings from the frames' flags and from what the run tells, one line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        let smeared = self.changed().map(|changed| {
-            format!("{changed}; the picture of their sum is smeared, pictures of fewer frames are less so")
+        let smeared = self.said_of_change().map(|changed| {
+            format!(
+                "{changed}; the picture of their sum is smeared, pictures of fewer frames are less so"
+            )
         });
         self.warnings_of_flags().into_iter().chain(smeared).collect()
     }
 
-    /// What is said of a scene that changed while the frames were taken; `None` if it did not, or of one frame.
+    /// By how much the scene's readings changed while several frames were taken: their variance over the run as a share of
+    /// their variation from pattern to pattern. `None` if they did not change, or of one frame.
     #[must_use]
-    pub fn changed(&self) -> Option<String> {
-        self.known.changed.filter(|_| self.frames > 1).map(|share| {
+    pub fn changed(&self) -> Option<f64> {
+        self.known.changed.filter(|_| self.frames > 1)
+    }
+
+    /// What is said of a scene that [changed](Self::changed).
+    #[must_use]
+    pub fn said_of_change(&self) -> Option<String> {
+        self.changed().map(|share| {
             format!(
                 "the scene's readings changed by {:.0} % of their variation while they were taken: it moves, or its light \
                  drifts",
