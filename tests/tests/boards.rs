@@ -234,7 +234,7 @@ fn the_cameras_loop_alone_feeds_the_watchdog() {
         }
         assert_eq!(registers, usize::from(board.pins.is_some()), "{}", board.name);
     }
-    for folder in ["app", "nucleo", "usb"] {
+    for folder in ["app", "usb"] {
         for (path, code) in sources(&format!("boards/{folder}/src")) {
             let in_loop = usize::from(path == "boards/app/src/run.rs");
             assert_eq!((calls(&code), pets(&code)), (in_loop, 0), "{path}");

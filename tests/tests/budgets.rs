@@ -140,8 +140,9 @@ fn a_hard_fault_switches_the_leds_off_before_anything_else() {
         if board.chip.is_none() {
             continue;
         }
-        let first = firmware.first_call("nirspi_nucleo::crash::fault");
-        assert_eq!(first, Some("nirspi_nucleo::crash::darken"), "{}", board.name);
+        let of_board = |path: &str| format!("{}::{path}", board.name.replace('-', "_"));
+        let first = firmware.first_call(&of_board("crash::fault"));
+        assert_eq!(first, Some(&*of_board("crash::darken")), "{}", board.name);
     }
 }
 

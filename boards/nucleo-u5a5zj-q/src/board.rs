@@ -1,15 +1,15 @@
 //! Sensors, LED enable, watchdog, restart.
 
-use crate::clocks;
+use crate::restart::restart;
+use crate::{clocks, crash};
 use embassy_stm32::adc::{Adc, AdcConfig, AnyAdcChannel, Averaging, SampleTime};
 use embassy_stm32::gpio::{Input, Output};
 use embassy_stm32::peripherals::{ADC1, IWDG};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Instant};
 use nirspi_app::Board;
+use nirspi_mcu::ntc::Thermistor;
 use nirspi_mcu::{Inputs, Lamps};
-use nirspi_nucleo::restart::restart;
-use nirspi_nucleo::{THERMISTOR, crash};
 use nirspi_wire::RebootInto;
 
 /// The system memory's boot loader (AN2606, STM32U59x and U5Ax).
@@ -17,6 +17,10 @@ pub const BOOTLOADER: usize = 0x0BF9_0000;
 
 /// A conversion takes 22 us.
 const TEMPERATURE_PERIOD: Duration = Duration::from_micros(nirspi_mcu::TEMPERATURE_PERIOD_US);
+
+/// The thermistor at the LED array, and the resistor in series with it. An array with another thermistor needs other
+/// numbers here.
+const THERMISTOR: Thermistor = Thermistor::REFERENCE;
 
 /// 14 bits, the mean of 16 conversions.
 pub fn adc_config() -> AdcConfig {

@@ -5,6 +5,7 @@
 //! an access always ends, whatever the FPGA does.
 
 use crate::clocks::SYSTEM_HZ;
+use crate::port::prescaler;
 use embassy_futures::select::select;
 use embassy_stm32::exti::ExtiInput;
 use embassy_stm32::mode::Async;
@@ -17,7 +18,6 @@ use embassy_stm32::pac::octospi::vals::SampleShift;
 use embassy_stm32::peripherals::OCTOSPI1;
 use nirspi_app::FpgaPort;
 use nirspi_mcu::{BusError, HostPort};
-use nirspi_nucleo::port::prescaler;
 use nirspi_wire::host_port::{QUAD, READ_PACKET, READ_REGISTER, SEALED_BYTES, WRITE_REGISTER};
 
 /// Prescaler of everything but packets.

@@ -10,11 +10,16 @@
 mod board;
 mod clocks;
 mod configuration;
+mod crash;
 mod depth;
 mod fpga;
+mod gateware;
+mod memory;
 #[cfg(feature = "parallel")]
 mod parallel;
 mod pins;
+mod port;
+mod restart;
 
 use board::Nucleo;
 use configuration::ConfigurationPort;
@@ -33,10 +38,10 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, dma, interrupt};
 use embassy_time::Instant;
 use fpga::Fpga;
+use memory::uncleared;
 use nirspi_app::link::{HostIn, HostOut, Link, Packet};
 use nirspi_app::{Board, DepthMailbox, Device, board_info, measure_depth, run};
 use nirspi_mcu::{HostPort, Limits};
-use nirspi_nucleo::{crash, gateware, restart, uncleared};
 use nirspi_usb::{Endpoints, Memory, OutBuffer, PACKET_BYTES, Presence, serve};
 use nirspi_wire::Capabilities;
 use nirspi_wire::fpga::MAX_FRAME_BYTES;

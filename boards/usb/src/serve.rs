@@ -10,7 +10,6 @@ use nirspi_mcu::{Micros, Patience, Remedy};
 
 /// Time that a host gets once the patience is over. A whole packet is nearly always under way, also when
 /// the camera's clock jumps ahead.
-#[cfg(any(test, feature = "dma"))]
 const MOMENT: embassy_time::Duration = embassy_time::Duration::from_millis(20);
 
 /// An endpoint to the host, beyond what embassy-usb asks of one.
@@ -20,7 +19,7 @@ pub trait ToHost: EndpointIn {
 
     /// Whether a `write` takes a packet of the wire protocol whole, out of memory at a multiple of four
     /// bytes, and ends when the host has fetched it. Otherwise a `write` copies at most [`PACKET_BYTES`],
-    /// and ends when the host has fetched the ones before. Without the feature `dma` nothing asks.
+    /// and ends when the host has fetched the ones before.
     fn takes_whole(&self) -> bool;
 }
 
@@ -54,9 +53,6 @@ where
         // The core may have been asleep when the session before ended.
         to_host.abort();
         patience.session_begins();
-        #[cfg(not(any(test, feature = "dma")))]
-        let talk = talk(&mut to_host, &mut packets, &mut patience);
-        #[cfg(any(test, feature = "dma"))]
         let talk = async {
             if to_host.takes_whole() {
                 talk_whole(&mut to_host, &mut packets, &mut patience).await
@@ -110,9 +106,7 @@ async fn talk(
     }
 }
 
-/// The same for an endpoint that takes packets whole. A function of its own, because a board without
-/// such an endpoint has no flash for it.
-#[cfg(any(test, feature = "dma"))]
+/// The same for an endpoint that takes packets whole.
 async fn talk_whole(
     endpoint: &mut impl ToHost,
     packets: &mut HostOut<'_, PACKET_BYTES>,

@@ -3,7 +3,7 @@
 //!
 //! The CRC processes several bytes in one step with as many tables ("slicing", Kounavis and Berry
 //! 2005): table `k` holds the effect of a byte `k` bytes later. With one table, CRC took two thirds
-//! of a frame's instructions. A chip whose flash is full has a table for half a byte.
+//! of a frame's instructions.
 
 /// The polynomial; bit 0 is its highest power.
 const POLYNOMIAL: u32 = 0xEDB8_8320;
@@ -13,12 +13,8 @@ const POLYNOMIAL: u32 = 0xEDB8_8320;
 static TABLES: Tables<16> = Tables::new();
 
 /// A microcontroller can spare 4 KB.
-#[cfg(all(target_os = "none", not(feature = "small-crc-table")))]
+#[cfg(target_os = "none")]
 static TABLES: Tables<4> = Tables::new();
-
-/// One of 64 KB of flash cannot.
-#[cfg(all(target_os = "none", feature = "small-crc-table"))]
-static TABLES: HalfBytes = HalfBytes::new();
 
 /// Register after `bits` zero bits, from `crc`.
 const fn shifted(mut crc: u32, bits: u32) -> u32 {
@@ -30,39 +26,9 @@ const fn shifted(mut crc: u32, bits: u32) -> u32 {
     crc
 }
 
-/// Processes half a byte in one step, with a table of 64 bytes.
-#[cfg(any(test, all(target_os = "none", feature = "small-crc-table")))]
-struct HalfBytes([u32; 16]);
-
-#[cfg(any(test, all(target_os = "none", feature = "small-crc-table")))]
-impl HalfBytes {
-    const fn new() -> Self {
-        let mut table = [0; 16];
-        let mut half = 0;
-        while half < 16 {
-            table[half] = shifted(half as u32, 4);
-            half += 1;
-        }
-        Self(table)
-    }
-
-    /// The register after `bytes`.
-    fn update(&self, mut crc: u32, bytes: &[u8]) -> u32 {
-        for &byte in bytes {
-            crc ^= u32::from(byte);
-            for _ in 0..2 {
-                crc = (crc >> 4) ^ self.0[(crc & 15) as usize];
-            }
-        }
-        crc
-    }
-}
-
 /// Processes `N` bytes in one step, with a table of 1 KB for each.
-#[cfg(any(test, not(all(target_os = "none", feature = "small-crc-table"))))]
 struct Tables<const N: usize>([[u32; 256]; N]);
 
-#[cfg(any(test, not(all(target_os = "none", feature = "small-crc-table"))))]
 impl<const N: usize> Tables<N> {
     const fn new() -> Self {
         let mut tables = [[0; 256]; N];
@@ -161,7 +127,6 @@ mod tests {
         ) {
             let expected = by_definition(&bytes);
             prop_assert_eq!(crc32(&bytes), expected);
-            prop_assert_eq!(!HalfBytes::new().update(u32::MAX, &bytes), expected);
             prop_assert_eq!(!Tables::<4>::new().update(u32::MAX, &bytes), expected);
             let (first, rest): (Vec<u8>, Vec<u8>) = {
                 let (a, b) = bytes.split_at(at.index(bytes.len() + 1));

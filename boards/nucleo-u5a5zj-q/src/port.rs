@@ -11,7 +11,7 @@ const HOST_CLOCK_MIN_HZ: u32 = 87_800_000;
 /// Fastest `sck` of accesses that the FPGA samples, in Hz.
 pub const SCK_MAX_HZ: u32 = HOST_CLOCK_MIN_HZ / SCK_DIVIDER as u32;
 
-/// Prescaler of an OCTOSPI or XSPI with this kernel clock, for an access with this opcode. The
+/// Prescaler of an OCTOSPI with this kernel clock, for an access with this opcode. The
 /// peripheral divides by one more than its prescaler.
 #[must_use]
 pub const fn prescaler(kernel_hz: u32, opcode: u8) -> u8 {
@@ -22,5 +22,5 @@ pub const fn prescaler(kernel_hz: u32, opcode: u8) -> u8 {
     (divider - 1) as u8
 }
 
-// The `_8` in the boards' drivers means eight dummy cycles.
+// The `_8` in `fpga.rs` means eight dummy cycles.
 const _: () = assert!(DUMMY_CYCLES == 8);

@@ -31,7 +31,6 @@ pub fn enter_bootloader_if_wished(vectors: usize) {
         // table. The chip's reference manual gives the address of the boot loader, whose vector
         // table begins with a stack pointer and an entry.
         unsafe {
-            #[cfg(feature = "stack-limit")]
             cortex_m::register::msplim::write(0);
             (*SCB::PTR).vtor.write(vectors as u32);
             cortex_m::asm::bootload(vectors as *const u32)

@@ -16,8 +16,6 @@ unsafe impl<T: Send, const N: usize> Sync for Uncleared<T, N> {}
 
 impl<T: Clone, const N: usize> Uncleared<T, N> {
     /// Memory that holds anything.
-    #[expect(clippy::new_without_default, reason = "only of a static that the macro makes")]
-    #[must_use]
     pub const fn new() -> Self {
         Self(UnsafeCell::new(MaybeUninit::uninit()))
     }
@@ -42,7 +40,6 @@ impl<T: Clone, const N: usize> Uncleared<T, N> {
 }
 
 /// `uncleared! { NAME: [TYPE; LENGTH], TAKEN }`: memory in a section that is not cleared, and the mark of its taker.
-#[macro_export]
 macro_rules! uncleared {
     ($name:ident: [$type:ty; $length:expr], $taken:ident) => {
         #[expect(unsafe_code, reason = "a section is chosen by an attribute that is unsafe to use")]
@@ -52,3 +49,4 @@ macro_rules! uncleared {
         static $taken: core::sync::atomic::AtomicBool = core::sync::atomic::AtomicBool::new(false);
     };
 }
+pub(crate) use uncleared;

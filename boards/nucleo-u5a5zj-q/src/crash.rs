@@ -6,9 +6,6 @@
 //! The LEDs go off first. Nothing here waits or uses the old stack, which may be the cause of the
 //! crash.
 
-#[cfg(feature = "terse")]
-mod trace;
-
 use core::cell::Cell;
 use core::fmt::Arguments;
 use core::panic::PanicInfo;
@@ -49,16 +46,9 @@ pub fn die(text: Arguments<'_>) -> ! {
     SCB::sys_reset()
 }
 
-#[cfg(not(feature = "terse"))]
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     die(format_args!("{info}"))
-}
-
-#[cfg(feature = "terse")]
-#[panic_handler]
-fn panic(_info: &PanicInfo<'_>) -> ! {
-    die(format_args!("panic{}", trace::Callers))
 }
 
 #[expect(unsafe_code, reason = "an exception handler that must not touch the stack it finds")]
