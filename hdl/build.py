@@ -137,6 +137,13 @@ def fmax_mhz(report: dict, clock: Clock) -> float:
     sys.exit(f"no clock {clock.net} among {', '.join(report['fmax'])}")
 
 
+def staging_bytes() -> dict[str, int]:
+    """The longest bitstream that a host can load through each microcontroller's board, as its board.toml says."""
+    key = "staging_bytes = "
+    facts = {path.parent.name: path.read_text().splitlines() for path in sorted((ROOT / "boards").glob("*/board.toml"))}
+    return {name: int(line.removeprefix(key)) for name, lines in facts.items() for line in lines if line.startswith(key)}
+
+
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--board", choices=BOARDS, default="ecp5-evn")
@@ -177,6 +184,9 @@ def main() -> None:
     bitstream = out / "nirspi.bit"
     run(out / "ecppack.log", tool("yowasp-ecppack"), "--compress", out / f"seed{best}.config", bitstream)
     print(f"\n{bitstream} (seed {best}, {bitstream.stat().st_size} bytes), {time.monotonic() - began:.0f} s")
+    for name, most in staging_bytes().items():
+        if bitstream.stat().st_size > most:
+            sys.exit(f"the bitstream does not fit into the memory of {name}, which takes {most} bytes: boards/{name}/board.toml, staging_bytes")
     if min(margins) < 1:
         sys.exit("timing missed")
 

@@ -8,9 +8,11 @@ use embassy_stm32::time::Hertz;
 use nirspi_mcu::BusError;
 use nirspi_mcu::ecp5::SlaveSpi;
 
-/// Longest bitstream that a host may load. The project's bitstream has 447 914 bytes
-/// (`hdl/build.py`, seed 1).
-pub const STAGING_BYTES: usize = 1 << 20;
+/// Longest bitstream that a host may load, as `board.toml` says. `hdl/build.py` compares the bitstream with it.
+pub const STAGING_BYTES: usize = match usize::from_str_radix(env!("STAGING_BYTES"), 10) {
+    Ok(bytes) => bytes,
+    Err(_) => panic!("staging_bytes in board.toml is a whole number"),
+};
 
 /// Bank 2, where `probe-rs download --binary-format bin --base-address 0x08200000` puts a
 /// bitstream.

@@ -48,14 +48,14 @@ mod tests {
 
     const HARDWARE: &str = "title = \"Toy\"\nkind = \"hardware\"\nprocessor = \"P1\"\ntarget = \"thumb\"\n\
         host_link = \"USB\"\nfpga_link = \"SPI\"\nstate = \"built\"\nflash_bytes = 65_536\nstatic_bytes = 20\n\
-        stack_bytes = 10\nchip = \"C1\"\nfpga_wires = 4\npin_name = \"P{number}\"\nled_enable_low = \"off({number})\"\n";
+        stack_bytes = 10\nchip = \"C1\"\nstaging_bytes = 7\nfpga_wires = 4\npin_name = \"P{number}\"\nled_enable_low = \"off({number})\"\n";
 
     #[test]
     fn a_board_is_what_its_board_toml_says() {
         let board = Board::parse("toy", HARDWARE).unwrap();
         assert_eq!((board.name, board.title, board.chip), ("toy", "Toy", Some("C1")));
         assert_eq!((board.flash_bytes, board.static_bytes, board.stack_bytes), (65_536, 20, 10));
-        assert_eq!(board.pins.unwrap().fpga_wires, 4);
+        assert_eq!((board.staging_bytes, board.pins.unwrap().fpga_wires), (Some(7), 4));
         assert_eq!(board.elf(), PathBuf::from("boards/target/thumb/release/toy"));
     }
 
@@ -72,7 +72,7 @@ mod tests {
                 "unknown key colour, expected one of title, kind",
             ),
             (format!("{HARDWARE}chip = \"C2\"\n"), "key chip is there twice"),
-            (format!("{HARDWARE}[section]\n"), "line 15 is \"[section]\", expected key = \"text\""),
+            (format!("{HARDWARE}[section]\n"), "line 16 is \"[section]\", expected key = \"text\""),
             (HARDWARE.replace("\"USB\"", "\"USB\" # fast"), "comments on lines of their own"),
             (HARDWARE.replace("\"Toy\"", "5"), "title must be a \"text\""),
             (HARDWARE.replace("65_536", "\"64 KB\""), "flash_bytes must be a whole number"),

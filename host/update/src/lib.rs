@@ -64,6 +64,20 @@ pub enum UpdateError {
         /// The camera's board.
         board: String,
     },
+    /// The camera's board has too little memory for the bitstream.
+    #[error(
+        "{file}: gateware of {bytes} bytes, but the camera's board {board} takes {most} at most: load the gateware into the FPGA board's own flash memory"
+    )]
+    TooLong {
+        /// The file of the release.
+        file: String,
+        /// Its length.
+        bytes: usize,
+        /// The camera's board.
+        board: String,
+        /// The longest bitstream that the board takes.
+        most: u64,
+    },
     /// The manifest does not list a file.
     #[error("{}: does not list {file}", manifest.display())]
     NotListed {
@@ -229,6 +243,17 @@ impl Plan {
             Some(gateware) if is_simulated(&camera.board) => {
                 let (file, board) = (gateware.asset.file.clone(), camera.board.clone());
                 Err(UpdateError::LoadsNone { file, board })
+            }
+            Some(gateware) => {
+                let most = Board::named(&camera.board).and_then(|board| board.staging_bytes);
+                let bytes = gateware.content.len();
+                match most.filter(|&most| bytes as u64 > most) {
+                    Some(most) => {
+                        let (file, board) = (gateware.asset.file.clone(), camera.board.clone());
+                        Err(UpdateError::TooLong { file, bytes, board, most })
+                    }
+                    None => Ok(plan),
+                }
             }
             _ => Ok(plan),
         })

@@ -155,6 +155,31 @@ fn what_does_not_fit_is_refused_before_the_camera_changes() {
 }
 
 #[test]
+fn a_bitstream_longer_than_the_boards_memory_is_refused_before_the_camera_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bitstream");
+    let most = Board::named("nucleo-u5a5zj-q").unwrap().staging_bytes.unwrap();
+    let plan = |length: u64| {
+        let mut long = bitstream();
+        long.resize(length as usize, 0xFF);
+        fs::write(&path, long).unwrap();
+        let gateware = Source {
+            path: path.clone(),
+            component: Component::Gateware,
+            board: "ecp5-evn".to_owned(),
+        };
+        let out = folder.path().join(length.to_string());
+        pack(&[gateware], &out).unwrap();
+        Release::open(&out).and_then(|release| Plan::new(&release, &identity(|_| {})))
+    };
+    assert!(plan(most).is_ok());
+    let told = plan(most + 1).unwrap_err().to_string();
+    let words =
+        "gateware of 1048577 bytes, but the camera's board nucleo-u5a5zj-q takes 1048576 at most";
+    assert!(told.contains(words), "{told}");
+}
+
+#[test]
 fn no_release_is_made_of_files_of_another_kind() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("firmware");

@@ -29,6 +29,8 @@ pub struct Board {
     pub static_bytes: u64,
     /// The least room for the stack.
     pub stack_bytes: u64,
+    /// The longest bitstream of gateware that a host can load through it; `None` for an emulated board.
+    pub staging_bytes: Option<u64>,
     /// Its pins; `None` for an emulated board.
     pub pins: Option<Pins>,
 }
@@ -59,7 +61,8 @@ const KEYS: [&str; 10] = [
     "stack_bytes",
 ];
 /// Keys of boards with `kind = "hardware"`.
-const HARDWARE_KEYS: [&str; 4] = ["chip", "fpga_wires", "pin_name", "led_enable_low"];
+const HARDWARE_KEYS: [&str; 5] =
+    ["chip", "staging_bytes", "fpga_wires", "pin_name", "led_enable_low"];
 
 #[derive(Clone, Copy)]
 enum Value {
@@ -163,6 +166,7 @@ impl Board {
             }
             _ => None,
         };
+        let staging_bytes = is_hardware.then(|| table.number("staging_bytes")).transpose()?;
         Ok(Self {
             name,
             title: table.text("title")?,
@@ -175,6 +179,7 @@ impl Board {
             flash_bytes: table.number("flash_bytes")?,
             static_bytes: table.number("static_bytes")?,
             stack_bytes: table.number("stack_bytes")?,
+            staging_bytes,
             pins,
         })
     }
