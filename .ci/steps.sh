@@ -42,6 +42,7 @@ beside=(gpu page web tcp recordings emulation mie)
 # Run by name alone, by GitHub or for a release. Their tools and builds take an hour.
 by_name=(
     "seeds           place and route of the gateware with five seeds, the best of which is packed; PyPI"
+    "silicon-minute  a minute of streaming at the highest rate on the model of the chip; PyPI, firmware"
     "licences        licences, sources and bans of all dependencies; crates.io"
     "flash           probe-rs knows every board's chip, and the program its options"
     "mutations-all   every deliberate fault in the RTL is seen, and every law can be broken"
@@ -228,13 +229,17 @@ step_emulation() {
     cargo test --locked --test budgets --test qemu --test faults -- --nocapture
 }
 
-# Unicorn is under the GPL: a tool like QEMU, loaded by these tests alone. The ELF under test is the one that is released;
-# `release-folder` compares its hash.
-step_silicon() {
-    local board=nucleo-u5a5zj-q
+# Unicorn is under the GPL: a tool like QEMU, loaded by these tests alone.
+unicorn() {
     python_with silicon unicorn==2.1.4
     NIRSPI_UNICORN=$(find "$PWD/target/silicon" -name 'libunicorn*.so.2' -o -name 'libunicorn.2.dylib' | head -1)
     export NIRSPI_UNICORN
+}
+
+# The ELF under test is the one that is released; `release-folder` compares its hash.
+step_silicon() {
+    local board=nucleo-u5a5zj-q
+    unicorn
     FEATURES=parallel bash boards/build.sh "$board"
     mkdir -p boards/target/silicon
     cp "$(elf "$board")" boards/target/silicon/parallel
@@ -243,6 +248,12 @@ step_silicon() {
     cargo build --locked --release
     cargo test --locked -p nirspi-tests-silicon --lib -- --nocapture 2>&1 | tee target/silicon.log
     if grep '^skipped: ' target/silicon.log; then return 1; fi
+}
+
+step_silicon_minute() {
+    [ -f "$(elf nucleo-u5a5zj-q)" ] || bash boards/build.sh nucleo-u5a5zj-q
+    unicorn
+    cargo test --locked -p nirspi-tests-silicon --lib -- --ignored --nocapture a_minute
 }
 
 step_application() {

@@ -36,6 +36,12 @@ impl Camera {
         self.machine.crash = Some(crash);
     }
 
+    /// Says how often the chip has restarted since power-up without a host that asked for it. The fault lamp shows the
+    /// number.
+    pub fn restarted(&mut self, times: u32) {
+        self.machine.restarts = u8::try_from(times).unwrap_or(u8::MAX);
+    }
+
     /// Takes bytes from the host, in pieces of any length, and returns how many bytes were taken.
     /// The board offers the rest again after the next poll. A command is taken only when its reply
     /// has a place to wait and the command before is answered, so a host that does not read is
@@ -147,7 +153,7 @@ impl Camera {
     pub fn lamps(&self, now: Micros) -> Lamps {
         let machine = &self.machine;
         let light = machine.off_pending || machine.state() == State::Running;
-        Lamps::at(now, machine.is_heard(), light, machine.fault)
+        Lamps::at(now, machine.is_heard(), light, machine.fault, machine.restarts)
     }
 
     /// What the calls act on, for the exhaustive walk of `tests::model`.

@@ -111,7 +111,11 @@ impl Machine {
         if let Some(fault) = safety::objection(inputs, &self.limits, self.fault) {
             return Err(Refusal::Fault(fault));
         }
-        if let Err(fault) = fpga::acknowledge(bus) {
+        let mut acknowledged = fpga::acknowledge(bus);
+        if acknowledged.is_ok() && self.fault == Some(fpga::WRONG_CLOCK) {
+            acknowledged = fpga::check_clock(bus);
+        }
+        if let Err(fault) = acknowledged {
             self.trip(now, fault, bus);
             return Err(Refusal::Fault(fault));
         }

@@ -10,8 +10,8 @@
 use crate::configure::Setup;
 use crate::{BusError, FpgaBus, Limits, Micros};
 use nirspi_wire::register::{
-    DAMAGED, Design, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, control, has_this_map,
-    status,
+    DAMAGED, Design, FaultCode, IDENTITY, NO_CLOCK, ORDER_TABLE, Register, clocks, control,
+    has_this_map, status,
 };
 use nirspi_wire::samples::Words;
 use nirspi_wire::{Fault, Version};
@@ -42,6 +42,9 @@ const SILENT: Fault = Fault::FpgaAbsent { identity: 0 };
 
 /// Fault of an FPGA whose gateware this firmware does not know.
 const FOREIGN: Fault = Fault::FpgaAbsent { identity: IDENTITY };
+
+/// Fault of an FPGA whose ADC has no clock, or one of another frequency.
+pub(crate) const WRONG_CLOCK: Fault = Fault::FpgaAbsent { identity: NO_CLOCK };
 
 /// The fault of an access that failed. Accesses to gateware of another version fail as if they were
 /// damaged, because that gateware checks none.
@@ -93,6 +96,19 @@ pub(crate) fn health(bus: &mut impl FpgaBus) -> Result<u32, Fault> {
     found
 }
 
+/// Checks that the ADC's clock has the frequency for which every time of the FPGA is meant. A clock that is too slow (a PLL
+/// that coasts without its input still ticks) stretches the FPGA's watchdog and the light of each pattern. A fault is one
+/// that every look has shown.
+pub(crate) fn check_clock(bus: &mut impl FpgaBus) -> Result<(), Fault> {
+    for _ in 0..LOOKS {
+        let word = read(bus, Register::Clocks).map_err(|error| failed(error, bus))?;
+        if clocks::fit(word) {
+            return Ok(());
+        }
+    }
+    Err(WRONG_CLOCK)
+}
+
 /// One look at identity, status and fault. The outer error is a transfer that did not complete.
 fn look(bus: &mut impl FpgaBus) -> Result<Result<u32, Fault>, Fault> {
     let mut word = |register| read(bus, register).map_err(|error| failed(error, bus));
@@ -102,7 +118,7 @@ fn look(bus: &mut impl FpgaBus) -> Result<Result<u32, Fault>, Fault> {
     }
     let status = word(Register::Status)?;
     if status == NO_CLOCK {
-        return Ok(Err(Fault::FpgaAbsent { identity: NO_CLOCK }));
+        return Ok(Err(WRONG_CLOCK));
     }
     if status & status::FAULT == 0 {
         return Ok(Ok(status));

@@ -9,6 +9,10 @@ use nirspi_wire::Fault;
 
 /// Half of a blink, and the time for which a flash is on, and then off.
 const BEAT_US: u64 = 250_000;
+/// How long a short flash is on, which counts a restart.
+const SHORT_US: u64 = 50_000;
+/// More restarts show as so many.
+pub const RESTARTS_SHOWN: u8 = 10;
 /// Beats without a flash after the flashes of a fault, so that a person can count them.
 const PAUSE_BEATS: u64 = 5;
 
@@ -21,21 +25,33 @@ pub struct Lamps {
     /// On while the FPGA may light LEDs: in a run, a raw burst, a test frame, and until the FPGA has confirmed that
     /// the LEDs are off.
     pub light: bool,
-    /// Flashes as often as [`flashes`] says for the standing fault, pauses, and flashes again.
+    /// Flashes as often as [`flashes`] says for the standing fault, pauses, and flashes again. Without a fault: short
+    /// flashes, as many as restarts since power-up that no host asked for, at most [`RESTARTS_SHOWN`].
     pub fault: bool,
 }
 
 impl Lamps {
-    pub(crate) fn at(now: Micros, has_session: bool, light: bool, fault: Option<Fault>) -> Self {
+    pub(crate) fn at(
+        now: Micros,
+        has_session: bool,
+        light: bool,
+        fault: Option<Fault>,
+        restarts: u8,
+    ) -> Self {
         let beat = now.0 / BEAT_US;
+        let (number, lasts_us) = match fault {
+            Some(fault) => (flashes(fault), BEAT_US),
+            None => (restarts.min(RESTARTS_SHOWN), SHORT_US),
+        };
         Self {
             ready: has_session || beat.is_multiple_of(2),
             light,
-            fault: fault.is_some_and(|fault| {
-                let beats = u64::from(flashes(fault)).saturating_mul(2);
+            // Mostly there is nothing to flash, and no division to make.
+            fault: number > 0 && {
+                let beats = u64::from(number).saturating_mul(2);
                 let within = beat.checked_rem(beats.saturating_add(PAUSE_BEATS)).unwrap_or(0);
-                within < beats && within.is_multiple_of(2)
-            }),
+                within < beats && within.is_multiple_of(2) && now.0 % BEAT_US < lasts_us
+            },
         }
     }
 }

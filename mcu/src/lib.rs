@@ -44,6 +44,7 @@ mod packets;
 mod patience;
 mod poll;
 mod ports;
+mod restarts;
 mod ring;
 mod run;
 mod safety;
@@ -58,7 +59,7 @@ pub use burst::RAW_PIECE_SAMPLES;
 pub use camera::Camera;
 pub use crash::{CRASH_WORDS, Crash};
 pub use host_port::{HostPort, PortBus, Target, Wanted};
-pub use lamps::{Lamps, flashes};
+pub use lamps::{Lamps, RESTARTS_SHOWN, flashes};
 pub use limits::{BOARD_WATCHDOG_US, Limits, TEMPERATURE_PERIOD_US};
 pub use merge::Merger;
 pub use patience::{PATIENCE, Patience, Remedy};
@@ -66,5 +67,6 @@ pub use ports::{
     BoardInfo, BusError, FpgaBus, GatewareLoader, Inputs, LoadError, NAME_BYTES, NoLoader,
     PacketSink, Ports, Progress,
 };
+pub use restarts::{ResetCause, RestartWords, report, restart_words, restarts};
 pub use ring::{Loan, Ring, RingMemory};
 pub use time::{CLOCKS_PER_MICRO, Micros};

@@ -13,6 +13,10 @@ pub const BOARD_WATCHDOG_US: u32 = 500_000;
 /// Time between two readings of the array's temperature. A thermistor is slow.
 pub const TEMPERATURE_PERIOD_US: u64 = 10_000;
 
+/// Time between two looks at the frequency of the ADC's clock while LEDs are lit: less than half of the FPGA's watchdog, whose
+/// time is of that clock. A power of two, so that no poll divides.
+pub const CLOCK_CHECK: Micros = Micros(1 << 16);
+
 /// Limits of one board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {

@@ -59,6 +59,8 @@ pub(crate) struct Machine {
     pub reboot: Option<RebootInto>,
     /// The crash that ended the last start, until a host has got the crash report.
     pub crash: Option<Crash>,
+    /// Restarts of the chip since power-up that no host asked for.
+    pub restarts: u8,
     pub commands_damaged: u32,
     pub last_command: Micros,
     /// When the FPGA's status was last read.
@@ -88,6 +90,7 @@ impl Machine {
             loading: None,
             reboot: None,
             crash: None,
+            restarts: 0,
             commands_damaged: 0,
             last_command: Micros(0),
             last_check: None,

@@ -1,7 +1,8 @@
 //! Signal meter: how strong the light is, how much of it depends on the pattern, and how much is
 //! noise. It helps to align the optics and to set the gain, without a reconstruction.
 //!
-//! Four times a second the meter compares two successive frames of a run, reading by reading. What a
+//! Four times a second the meter compares two frames of a run, reading by reading: two successive ones, or where the FPGA
+//! loses frames two that are at most [`APART`] apart. What a
 //! reading changes by from one frame to the next is noise; what the readings of one frame differ by
 //! is signal and noise. The meter adds up integers while frames pass; [`Tally::signal`] computes
 //! counts and decibels in floating point when the host asks for the status.
@@ -23,6 +24,9 @@ use nirspi_wire::{ADC_BITS, FrameFlags, Signal};
 
 /// Time between two comparisons.
 const PERIOD: Micros = Micros(250_000);
+
+/// Most frames from the first of a pair to the second.
+const APART: u32 = 8;
 
 /// Bits of a reading as the meter keeps it, sign included: the squares of 1024 differences of two
 /// such readings fit in 64 bits.
@@ -110,19 +114,22 @@ impl Meter {
         let mut reader = Reader::new(packet, patterns);
         let sequence = reader.sequence;
         let counts = !reader.flags.contains(FrameFlags::OVERFLOW);
-        let follows = matches!(self.pair, Pair::Begun { sequence: before, .. }
-            if sequence == before.wrapping_add(1));
+        let apart = match self.pair {
+            Pair::Begun { sequence: before, .. } => Some(sequence.wrapping_sub(before)),
+            Pair::Due(_) => None,
+        };
         let length = usize::from(patterns).saturating_mul(4);
         let Some(memory) = scratch.get_mut(..length) else { return };
         self.pair = Pair::Due(due);
-        if follows && counts {
+        if let Some(apart) = apart {
+            // Whatever comes of this pair: a look at two packets takes as long as many others.
+            self.pair = Pair::Due(Micros(due.0.saturating_add(PERIOD.0)));
+            if !counts || apart == 0 || apart > APART {
+                return;
+            }
             let tally = self.tally(&mut || reader.sample(), memory);
             if let (true, Ok((levels, over_range))) = (reader.is_intact(), measures(bus)) {
                 self.last = Some(Tally { levels, over_range, ..tally });
-                self.pair = Pair::Due(Micros(due.0.saturating_add(PERIOD.0)));
-            } else if bus.ring().is_some() {
-                // Between two frames there is no level, and a look at two packets takes as long as many others.
-                self.pair = Pair::Due(Micros(due.0.saturating_add(PERIOD.0)));
             }
         } else {
             let (words, _) = memory.as_chunks_mut::<4>();

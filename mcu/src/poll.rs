@@ -7,6 +7,7 @@
 //! the command to stop, and the FPGA's own watchdog ends the run meanwhile
 //! (`tests::safety::a_dead_bus_is_an_absent_fpga_and_is_told_again_to_stop_on_every_poll`).
 
+use crate::limits::CLOCK_CHECK;
 use crate::machine::{Activity, Machine};
 use crate::{FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, Progress, fpga, safety};
 use nirspi_wire::register::{Register, status};
@@ -71,13 +72,19 @@ impl Machine {
         if early || self.is_loading() {
             return;
         }
-        self.last_check = Some(now);
+        let was = self.last_check.replace(now);
         let status = match fpga::health(bus) {
             Ok(status) => status,
             Err(fault) => return self.trip(now, fault, bus),
         };
         match &self.activity {
             Activity::Run(run) if run.is_lit() => {
+                let part = |time: Micros| time.0 / CLOCK_CHECK.0;
+                if was.is_none_or(|was| part(was) != part(now))
+                    && let Err(fault) = fpga::check_clock(bus)
+                {
+                    return self.trip(now, fault, bus);
+                }
                 // A second look: one wrong bit must not end a run.
                 let over = |status: u32| status & status::RUNNING == 0;
                 if over(status) && fpga::health(bus).is_ok_and(over) {

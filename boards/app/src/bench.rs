@@ -8,10 +8,10 @@ use core::task::Waker;
 use nirspi_mcu::{BusError, GatewareLoader, HostPort, Inputs, Lamps, LoadError, Micros, Ring};
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{MAX_HOST_PACKET, seal as seal_packet};
-use nirspi_wire::register::{IDENTITY, Register, control, mode, status};
+use nirspi_wire::register::{IDENTITY, Register, clocks, control, mode, status};
 use nirspi_wire::{
-    Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource, encode,
-    ready,
+    ADC_HZ, Command, Configuration, FrameFlags, PatternOrder, RebootInto, Request, SampleSource,
+    encode, ready,
 };
 use std::rc::Rc;
 use std::vec::Vec;
@@ -252,6 +252,9 @@ impl HostPort for FakeFpga {
         let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
             Some(Register::Version) => Register::Version.reset(),
+            Some(Register::Clocks) => {
+                clocks::LOCKED | clocks::ALIVE | clocks::READY | (ADC_HZ / clocks::UNIT_HZ)
+            }
             Some(Register::Design) => Register::Design.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             // The frame that is ready is made already.

@@ -44,6 +44,8 @@ pub struct Device<'b, B, P, G> {
     pub limits: Limits,
     /// The crash that ended the last start, from [`crash::take`](crate::crash::take).
     pub crash: Option<Crash>,
+    /// Restarts since power-up that no host asked for.
+    pub restarts: u32,
 }
 
 /// Identity of a board, by the name of its folder, with this firmware's version.
@@ -78,9 +80,10 @@ pub async fn run<B: Board, P: FpgaPort, G: GatewareLoader>(
     mut link: CameraEnd<'_>,
     depth: &DepthMailbox,
 ) -> ! {
-    let Device { mut board, port, frame, mut loader, info, limits, crash } = device;
+    let Device { mut board, port, frame, mut loader, info, limits, crash, restarts } = device;
     let mut bus = PortBus::new(port, frame);
     let mut camera = Camera::new(info, limits);
+    camera.restarted(restarts);
     if let Some(crash) = crash {
         camera.restarted_after(crash);
     }

@@ -45,6 +45,7 @@ impl Bench {
             info: board_info("bench", "0001"),
             limits: Limits::default(),
             crash: None,
+            restarts: 0,
         };
         let depth: &'static DepthMailbox = Box::leak(Box::new(DepthMailbox::new()));
         let camera = Box::pin(async move { run(device, camera_end, depth).await });

@@ -130,6 +130,7 @@ async fn camera(board: Emulated, link: CameraEnd<'static>) -> ! {
         info: board_info("mps2-an505", "QEMU"),
         limits: Limits::default(),
         crash: crash::take(),
+        restarts: 0,
     };
     nirspi_app::run(device, link, DEPTH.init(DepthMailbox::new())).await
 }

@@ -1,7 +1,6 @@
 //! Sensors, LED enable, watchdog, restart.
 
-use crate::restart::restart;
-use crate::{clocks, crash};
+use crate::{clocks, crash, restart};
 use embassy_stm32::adc::{Adc, AdcConfig, AnyAdcChannel, Averaging, SampleTime};
 use embassy_stm32::gpio::{Input, Output};
 use embassy_stm32::peripherals::{ADC1, IWDG};
@@ -71,10 +70,11 @@ impl Board for Nucleo {
 
     fn feed_watchdog(&mut self) {
         self.watchdog.pet();
+        restart::is_alive(Instant::now().as_millis() as u32);
     }
 
     fn restart(&mut self, into: RebootInto) -> ! {
         self.led_enable.set_low();
-        restart(into)
+        restart::restart(into)
     }
 }

@@ -97,6 +97,12 @@ async fn depth_sensor(sensor: Depth, mailbox: &'static DepthMailbox) -> ! {
 async fn main(spawner: Spawner) {
     restart::enter_bootloader_if_wished(board::BOOTLOADER);
     clocks::start_watchdog();
+    let start = restart::begin();
+    // Every second restart lights the lamp from here on, so it blinks where no start gets further than its waits.
+    let is_odd = start.restarts % 2 == 1;
+    if is_odd {
+        pins::light_fault_lamp();
+    }
     let p = embassy_stm32::init(clocks::config());
     let pins = pins::take_pins!(p);
     let led_enable = Output::new(pins.led_enable, Level::Low, Speed::Low);
@@ -115,7 +121,7 @@ async fn main(spawner: Spawner) {
         #[cfg(not(feature = "parallel"))]
         lamp_ready: Some(Output::new(pins.lamp_ready, Level::Low, Speed::Low)),
         lamp_light: Output::new(pins.lamp_light, Level::Low, Speed::Low),
-        lamp_fault: Output::new(pins.lamp_fault, Level::Low, Speed::Low),
+        lamp_fault: Output::new(pins.lamp_fault, is_odd.into(), Speed::Low),
         interlock: Input::new(pins.interlock, Pull::Down),
         adc: Adc::new_with_config(p.ADC1, board::adc_config()),
         thermistor: pins.thermistor.degrade_adc(),
@@ -212,7 +218,8 @@ async fn main(spawner: Spawner) {
         loader: gateware::Loader::new(configuration, STAGING.fill(&STAGING_TAKEN, 0)),
         info,
         limits: Limits::default(),
-        crash: nirspi_app::crash::take(),
+        crash: nirspi_app::crash::take().or(start.report),
+        restarts: start.restarts,
     };
     run(device, camera, mailbox).await
 }

@@ -40,7 +40,7 @@ pin_table! { ($)
     // Lamps on the board.
     lamp_ready: PC7 => "LD1", "nothing: green, the camera waits for a host or has one";
     lamp_light: PB7 => "LD2", "nothing: blue, LEDs may be lit";
-    lamp_fault: PG2 => "LD3", "nothing: red, flashes the number of a fault";
+    lamp_fault: PG2 => "LD3", "nothing: red, flashes the number of a fault, or of restarts";
     // The ECP5's configuration port, SPI1.
     config_sck: PA5 => "CN7 D13", "ECP5 CCLK";
     config_mosi: PA7 => "CN7 D11", "ECP5 SI (MOSI)";
@@ -54,6 +54,15 @@ pin_table! { ($)
     // The connector of the board.
     usb_dp: PA12 => "user USB-C", "host D+";
     usb_dm: PA11 => "user USB-C", "host D-";
+}
+
+/// Lights `lamp_fault` before the clocks run: its port's supply and clock, then the pin.
+pub fn light_fault_lamp() {
+    pac::RCC.ahb3enr().modify(|enable| enable.set_pwren(true));
+    pac::PWR.svmcr().modify(|supplies| supplies.set_io2sv(true));
+    pac::RCC.ahb2enr1().modify(|enable| enable.set_gpiogen(true));
+    pac::GPIOG.bsrr().write(|bits| bits.set_bs(2, true));
+    pac::GPIOG.moder().modify(|modes| modes.set_moder(2, pac::gpio::vals::Moder::OUTPUT));
 }
 
 /// Sets `led_enable` low. This needs only the port, so it works in any state of the firmware.

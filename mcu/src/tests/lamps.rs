@@ -1,7 +1,7 @@
 //! What the lamps of the board show in each state.
 
 use super::support::*;
-use crate::{Lamps, Micros, flashes};
+use crate::{Lamps, Micros, RESTARTS_SHOWN, flashes};
 use nirspi_wire::{Command, Fault, RunLength};
 use std::vec::Vec;
 
@@ -18,12 +18,13 @@ const FAULTS: [Fault; 10] = [
     Fault::HostSilent,
 ];
 
-/// Flashes and the longest dark time of the fault lamp in milliseconds, over one minute.
-fn seen(fault: Fault) -> (Vec<u32>, u64) {
+/// Flashes, the longest dark time of the fault lamp and its longest flash in milliseconds, over one minute.
+fn seen(fault: Option<Fault>, restarts: u8) -> (Vec<u32>, u64, u64) {
     let (mut groups, mut group, mut dark, mut longest) = (Vec::new(), 0, 0u64, 0);
+    let (mut bright, mut longest_flash) = (0, 0);
     let mut was_lit = true;
     for ms in 0..60_000 {
-        let lit = Lamps::at(Micros(ms * 1_000), true, false, Some(fault)).fault;
+        let lit = Lamps::at(Micros(ms * 1_000), true, false, fault, restarts).fault;
         if lit && !was_lit {
             // A pause is much longer than the dark time between two flashes.
             if dark > 1_000 {
@@ -33,20 +34,36 @@ fn seen(fault: Fault) -> (Vec<u32>, u64) {
         }
         dark = if lit { 0 } else { dark + 1 };
         longest = longest.max(dark);
+        bright = if lit { bright + 1 } else { 0 };
+        longest_flash = longest_flash.max(bright);
         was_lit = lit;
     }
-    (groups, longest)
+    (groups, longest, longest_flash)
 }
 
 #[test]
 fn a_person_can_count_the_flashes_of_each_fault_and_no_two_faults_flash_alike() {
     for (fault, number) in FAULTS.into_iter().zip(1..) {
         assert_eq!(u32::from(flashes(fault)), number, "{fault:?}");
-        let (groups, longest) = seen(fault);
+        // A restart of the firmware does not hide a fault.
+        let (groups, longest, _) = seen(Some(fault), 3);
         assert!(groups.len() > 6, "{fault:?}: {groups:?}");
         // The first group began before the minute.
         assert!(groups[1..].iter().all(|&count| count == number), "{fault:?}: {groups:?}");
         assert!((1_000..=2_000).contains(&longest), "{fault:?}: dark for {longest} ms");
+    }
+}
+
+#[test]
+fn short_flashes_count_the_restarts_that_no_host_asked_for() {
+    let (groups, dark, _) = seen(None, 0);
+    assert_eq!((groups.len(), dark), (0, 60_000));
+    for restarts in [1, 2, 10, 200] {
+        let (groups, longest, flash) = seen(None, restarts);
+        assert!(groups.len() > 6, "{groups:?}");
+        let shown = u32::from(restarts.min(RESTARTS_SHOWN));
+        assert!(groups[1..].iter().all(|&count| count == shown), "{restarts}: {groups:?}");
+        assert!((1_000..=2_000).contains(&longest) && flash == 50, "{longest} {flash}");
     }
 }
 

@@ -2,9 +2,12 @@
 //! is gone and acknowledged.
 
 use super::support::*;
-use crate::Micros;
-use nirspi_wire::register::{FaultCode, IDENTITY, NO_CLOCK, Register};
-use nirspi_wire::{Answer, Command, Configuration, EventKind, Fault, Refusal, RunLength, State};
+use crate::limits::CLOCK_CHECK;
+use crate::{Limits, Micros};
+use nirspi_wire::register::{FaultCode, IDENTITY, NO_CLOCK, Register, clocks};
+use nirspi_wire::{
+    ADC_HZ, Answer, Command, Configuration, EventKind, Fault, Refusal, RunLength, State,
+};
 
 /// Breaks something in a running camera, lets `wait` pass, polls once, and checks everything that a
 /// fault must cause; then repairs the cause and checks that the camera works again.
@@ -112,6 +115,42 @@ fn an_adc_clock_that_is_lost_and_comes_back() {
     );
 }
 
+fn clock(bench: &mut Bench, hz: u32) {
+    let ready = bench.fpga.get(Register::Clocks) & !clocks::FREQUENCY;
+    bench.fpga.registers.insert(Register::Clocks.address(), ready | (hz / clocks::UNIT_HZ));
+}
+
+/// A PLL without its input coasts, and ticks on.
+#[test]
+fn an_adc_clock_of_another_frequency() {
+    for hz in [0, 22_000_000, 30_000_000, 106_000_000, 144_000_000] {
+        expect_fault(
+            |bench| clock(bench, hz),
+            CLOCK_CHECK.0,
+            Fault::FpgaAbsent { identity: NO_CLOCK },
+            |bench| clock(bench, ADC_HZ),
+        );
+    }
+    // The time of a watchdog that runs on this clock is not to be trusted, so the look comes before its end.
+    let watchdog_us = u64::from(Limits::REFERENCE.watchdog_clocks) / crate::CLOCKS_PER_MICRO;
+    assert!(2 * CLOCK_CHECK.0 <= watchdog_us);
+}
+
+#[test]
+fn an_adc_clock_as_exact_as_the_fpga_can_tell_ends_no_run_and_a_wrong_one_is_not_acknowledged() {
+    for hz in [107_000_000, ADC_HZ, 143_000_000] {
+        let mut bench = Bench::running(RunLength::Continuous);
+        clock(&mut bench, hz);
+        bench.after(100_000);
+        assert!(bench.fpga.leds_on(), "{hz}");
+    }
+    let mut bench = Bench::running(RunLength::Continuous);
+    clock(&mut bench, 30_000_000);
+    bench.after(100_000);
+    let fault = Fault::FpgaAbsent { identity: NO_CLOCK };
+    assert_eq!(bench.ask(Command::Configure(SMALL)), Err(Refusal::Fault(fault)));
+}
+
 #[test]
 fn one_wrong_bit_in_a_check_ends_no_run_and_a_wrong_bit_in_each_does() {
     for read in 0..2 {
@@ -171,7 +210,7 @@ fn a_run_of_long_frames_is_given_the_time_of_eight() {
 
 #[test]
 fn a_silent_host() {
-    let limit = crate::Limits::default().host_silence.0;
+    let limit = Limits::default().host_silence.0;
     let mut bench = Bench::running(RunLength::Continuous);
     for _ in 0..limit / 10_000 {
         bench.fpga.make_frame();

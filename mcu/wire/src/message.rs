@@ -403,7 +403,7 @@ pub enum Fault {
     /// The FPGA does not answer, answers with another identity, or cannot be used.
     FpgaAbsent {
         /// What the identity register read. [`NO_CLOCK`](crate::register::NO_CLOCK): the identity is right, and
-        /// the ADC's clock is missing. [`IDENTITY`](crate::register::IDENTITY): the gateware is of another
+        /// the ADC's clock is missing or has another frequency. [`IDENTITY`](crate::register::IDENTITY): the gateware is of another
         /// version than the firmware's. [`DAMAGED`](crate::register::DAMAGED): answers or writes came damaged,
         /// however often they were repeated.
         identity: u32,

@@ -181,6 +181,8 @@ pub struct Machine {
     /// Bytes of stack to begin with, in place of all.
     stack_room: Option<u32>,
     image: Vec<(u32, Vec<u8>)>,
+    /// The supply is too low to run.
+    held: bool,
     /// Restarts of the chip so far: time in microseconds, cause, where the processor was.
     pub resets: Vec<(u64, Cause, u32)>,
 }
@@ -250,6 +252,7 @@ impl Machine {
             stack,
             stack_room,
             image,
+            held: false,
             resets: Vec::new(),
         };
         machine.power_up();
@@ -320,6 +323,17 @@ impl Machine {
         self.pc = address;
     }
 
+    /// Lets the processor go round in a loop for ever, with interrupts off.
+    ///
+    /// # Panics
+    /// If there is no flash.
+    pub fn stand_still(&mut self) {
+        let last = FLASH + FLASH_BYTES as u32 - 4;
+        assert!(self.memory().put(last, &[0xFE, 0xE7]), "memory");
+        self.processor.set(Register::Primask, 0, 1);
+        self.derail(last);
+    }
+
     /// How deep the stack has been, in bytes, and how deep it may be.
     #[must_use]
     pub fn deepest_stack(&self) -> (u32, u32) {
@@ -367,6 +381,17 @@ impl Machine {
 
     fn run_until(&mut self, end_ps: u64, mut done: impl FnMut(&Chip) -> bool) -> Stop {
         loop {
+            if self.chip(|chip| chip.is_browned_out()) {
+                if !self.held {
+                    self.held = true;
+                    self.resets.push((self.bus().now() / 1_000_000, Cause::BrownOut, self.pc));
+                    self.chip(|chip| chip.restart(Cause::BrownOut));
+                    self.start();
+                }
+                self.bus().jump(end_ps);
+                return Stop::Time;
+            }
+            self.held = false;
             let now = self.bus().now();
             let (due, reset) = self.chip(|chip| {
                 chip.now = now;
@@ -375,7 +400,7 @@ impl Machine {
             });
             if let Some(cause) = reset {
                 self.resets.push((now / 1_000_000, cause, self.pc));
-                self.chip(Chip::restart);
+                self.chip(|chip| chip.restart(cause));
                 self.start();
                 return Stop::Reset(cause);
             }

@@ -32,11 +32,11 @@ use nirspi_mcu::{
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{self, MAX_HOST_PACKET, encode};
-use nirspi_wire::register::{IDENTITY, Register, control, status};
+use nirspi_wire::register::{IDENTITY, Register, clocks, control, status};
 use nirspi_wire::samples::Width;
 use nirspi_wire::{
-    Command, Configuration, FrameFlags, PATTERNS, PatternOrder, Request, RunLength, SampleSource,
-    Version, ready, version,
+    ADC_HZ, Command, Configuration, FrameFlags, PATTERNS, PatternOrder, Request, RunLength,
+    SampleSource, Version, ready, version,
 };
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -116,6 +116,9 @@ impl HostPort for Memory {
         let value = match Register::at(address) {
             Some(Register::Identity) => IDENTITY,
             Some(Register::Version) => Register::Version.reset(),
+            Some(Register::Clocks) => {
+                clocks::LOCKED | clocks::ALIVE | clocks::READY | (ADC_HZ / clocks::UNIT_HZ)
+            }
             Some(Register::Design) => Register::Design.reset(),
             Some(Register::Status) => status::INTERLOCK_CLOSED | running,
             // With the frame that is ready.

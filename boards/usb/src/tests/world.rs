@@ -140,6 +140,7 @@ impl World {
             info,
             limits: Limits::default(),
             crash,
+            restarts: 0,
         };
         let depth: &'static DepthMailbox = Box::leak(Box::new(DepthMailbox::new()));
         let futures: [Pin<Box<dyn Future<Output = ()>>>; 3] = [

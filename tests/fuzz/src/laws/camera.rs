@@ -12,8 +12,8 @@ use nirspi_mcu::{
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::{SEALED_BYTES, seal};
 use nirspi_wire::packet::{overhead, seal as seal_packet};
-use nirspi_wire::register::{IDENTITY, Register};
-use nirspi_wire::{Command, DeviceMessage, Reply, State, Version, open, version};
+use nirspi_wire::register::{IDENTITY, Register, clocks};
+use nirspi_wire::{ADC_HZ, Command, DeviceMessage, Reply, State, Version, open, version};
 use std::collections::VecDeque;
 use std::io;
 use std::ops::{ControlFlow, Range};
@@ -182,6 +182,9 @@ impl HostPort for AnyFpga<'_> {
         let known = match Register::at(address) {
             Some(Register::Identity) => Some(IDENTITY),
             Some(register @ (Register::Version | Register::Design)) => Some(register.reset()),
+            Some(Register::Clocks) => {
+                Some(clocks::LOCKED | clocks::ALIVE | clocks::READY | (ADC_HZ / clocks::UNIT_HZ))
+            }
             Some(Register::Writes) => Some(self.accesses),
             _ => None,
         };

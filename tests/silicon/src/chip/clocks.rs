@@ -91,6 +91,10 @@ impl Chip {
             0xE4 if value >> 20 & 3 != 0 => {
                 self.violation("OCTOSPI's clock is not the core's".into());
             }
+            // RMVF forgets the reset flags.
+            0xF4 if value >> 23 & 1 == 1 => {
+                self.set(RCC + offset, value & 0x007F_FFFF);
+            }
             0xF0 => self.rises(Ready("RCC.BDCR", 27), value >> 26 & 1 == 1, 130 * US),
             _ => {}
         }
@@ -196,6 +200,14 @@ impl Chip {
         let control = self.value(SVMCR);
         let levels = [2000, 2200, 2400, 2500, 2600, 2800, 2900, 0];
         if control >> 4 & 1 == 1 { levels[(control >> 5 & 7) as usize] } else { 0 }
+    }
+
+    /// Whether the supply is below the brown-out level, where the chip is held in reset (data sheet, table 35, falling).
+    #[must_use]
+    pub fn is_browned_out(&self) -> bool {
+        let levels = [1700, 2000, 2200, 2500, 2800];
+        let level = levels.get(self.brown_out_level as usize).copied().unwrap_or(2800);
+        self.supply_millivolts < level
     }
 
     pub(super) fn write_pwr(&mut self, offset: u32, value: u32) {

@@ -46,6 +46,7 @@ pub const APB2ENR: u32 = 0xA4;
 pub const APB3ENR: u32 = 0xA8;
 
 pub const RCC: u32 = 0x4602_0C00;
+pub const RCC_CSR: u32 = RCC + 0xF4;
 pub const FLASH_ACR: u32 = 0x4002_2000;
 pub const PWR: u32 = 0x4602_0800;
 pub const GPIO: u32 = 0x4202_0000;

@@ -31,6 +31,20 @@ pub enum Cause {
     Software,
     /// The watchdog was not fed.
     Watchdog,
+    /// The supply fell below the brown-out level.
+    BrownOut,
+}
+
+impl Cause {
+    /// Its flags in `RCC.CSR` (RM0456, 11.8.59). Every reset pulls the reset pin low.
+    fn flags(self) -> u32 {
+        let own = match self {
+            Self::Software => 28,
+            Self::Watchdog => 29,
+            Self::BrownOut => 27,
+        };
+        1 << own | 1 << 26
+    }
 }
 
 /// Interrupt controller (ARMv8-M ARM, B3.22). All interrupts have one priority; another one is a violation.
@@ -81,6 +95,8 @@ pub struct Chip {
     pub stuck: Option<Ready>,
     mutation: fn(u32, u32) -> Option<u32>,
     pub supply_millivolts: u32,
+    /// The option byte `BOR_LEV`.
+    pub brown_out_level: u32,
     core: f64,
     /// The processor's clock has changed.
     pub clock_changed: bool,
@@ -151,6 +167,7 @@ impl Chip {
             stuck,
             mutation,
             supply_millivolts: 3300,
+            brown_out_level: 4,
             core: 4e6,
             clock_changed: false,
             reset: None,
@@ -163,10 +180,12 @@ impl Chip {
         chip
     }
 
-    /// Starts the chip again. Memory, time, what is outside, and what was noted stay.
-    pub fn restart(&mut self) {
+    /// Starts the chip again. Memory, time, what is outside, what was noted and the reset flags stay.
+    pub fn restart(&mut self, cause: Cause) {
         let lit = self.is_lit();
+        let flags = self.value(map::RCC_CSR);
         self.values.clear();
+        self.set(map::RCC_CSR, flags | cause.flags());
         self.rising.clear();
         self.start_clocks();
         self.nvic = Nvic { entered: std::mem::take(&mut self.nvic.entered), ..Nvic::default() };
@@ -267,6 +286,9 @@ impl Chip {
         let clock_ps = self.clock_ps();
         match part {
             Part::Rcc => self.read_rcc(offset),
+            Part::Flash if offset == 0x40 => {
+                self.value(address) & !(7 << 8) | self.brown_out_level << 8
+            }
             Part::Pwr => self.read_pwr(offset),
             Part::Timer(number) => self.timers[number].read(offset, self.now, clock_ps),
             Part::Gpio(port) if offset == 0x10 => {

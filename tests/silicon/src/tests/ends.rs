@@ -1,7 +1,8 @@
 //! Crash, restart, boot loader, supply, gateware.
 
 use super::*;
-use crate::machine::Stop;
+use crate::chip::Cause;
+use crate::machine::{Machine, Stop};
 use nirspi_tests::tapped::{Tapped, measure};
 use nirspi_wire::{Fault, RebootInto, State};
 
@@ -86,6 +87,8 @@ fn a_restart_that_the_host_asks_for_is_back_on_the_bus() {
 #[test]
 fn a_supply_that_sags_while_lit_is_dark_at_once_and_stays_dark() {
     let Some(camera) = connected_as(even()) else { return };
+    // The option byte as delivered: only the voltage detector sees the sag.
+    camera.with(|machine| machine.chip(|chip| chip.brown_out_level = 0));
     let mut session = Session::open(camera.link()).unwrap();
     start(&mut session, &natural());
     pass(&camera, 2.0);
@@ -103,6 +106,112 @@ fn a_supply_that_sags_while_lit_is_dark_at_once_and_stays_dark() {
     camera.connect();
     let mut session = Session::open(camera.link()).unwrap();
     assert!(measure(&mut session, &natural(), 2).counters.is_complete());
+    camera.assert_no_violation();
+}
+
+/// The option byte as the board's page asks for it. The chip is in reset before the firmware sees anything.
+#[test]
+fn a_brown_out_while_lit_is_dark_at_once_and_the_next_host_is_told_of_it_once() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &natural());
+    pass(&camera, 20.0);
+    assert!(is_lit(&camera));
+    let supply = |millivolts| {
+        camera.with(move |machine| machine.chip(|chip| chip.supply_millivolts = millivolts));
+    };
+    supply(2_000);
+    pass(&camera, 0.001);
+    assert!(!is_lit(&camera));
+    pass(&camera, 700.0);
+    drop(session);
+    supply(3_300);
+    camera.connect();
+    let hear = || {
+        let mut tapped = Tapped::new(camera.link());
+        let mut session = Session::open(tapped.link()).unwrap();
+        session.status(&mut IgnorePackets).unwrap();
+        assert!(!is_lit(&camera));
+        tapped.crashes()
+    };
+    let told = hear();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("the supply fell below the brown-out level"), "{told:?}");
+    assert!(hear().is_empty());
+    let mut session = Session::open(camera.link()).unwrap();
+    assert!(measure(&mut session, &natural(), 2).counters.is_complete());
+    // The configuration has acknowledged the FPGA's fault, whose watchdog ended the run.
+    assert_eq!(restart_flashes(&camera), 1);
+    let causes =
+        camera.with(|machine| machine.resets.iter().map(|reset| reset.1).collect::<Vec<_>>());
+    assert_eq!(causes, [Cause::BrownOut]);
+    camera.assert_no_violation();
+}
+
+/// Flashes of LD3 in one group.
+fn restart_flashes(camera: &Camera) -> usize {
+    let lamp = || {
+        camera.with(|machine| {
+            machine.run_while(10_000.0, |_| false);
+            machine.chip(|chip| {
+                let (port, bit) = chip.place("lamp_fault");
+                chip.level(port, bit)
+            })
+        })
+    };
+    // A pause of more than a second, then the group up to the next pause.
+    let (mut dark, mut flashes, mut was) = (0, None, false);
+    for _ in 0..2_000 {
+        let lit = lamp();
+        dark = if lit { 0 } else { dark + 1 };
+        if lit
+            && !was
+            && let Some(count) = &mut flashes
+        {
+            *count += 1;
+        }
+        if dark == 100 {
+            match flashes {
+                Some(count) if count > 0 => return count,
+                _ => flashes = Some(0),
+            }
+        }
+        was = lit;
+    }
+    0
+}
+
+#[test]
+fn ld3_counts_the_restarts_that_no_host_asked_for() {
+    let Some(camera) = connected_as(even()) else { return };
+    assert_eq!(restart_flashes(&camera), 0);
+    for crashes in 1..=3 {
+        camera.with(|machine| machine.derail(NOWHERE));
+        pass(&camera, 50.0);
+        assert_eq!(restart_flashes(&camera), crashes);
+    }
+    camera.connect();
+    let mut session = Session::open(camera.link()).unwrap();
+    session.command(request::Reboot(RebootInto::Application), &mut IgnorePackets).unwrap();
+    drop(session);
+    pass(&camera, 300.0);
+    assert_eq!(restart_flashes(&camera), 3);
+    camera.assert_no_violation();
+}
+
+#[test]
+fn a_firmware_that_stands_still_is_restarted_and_the_next_host_is_told_by_what() {
+    let Some(camera) = connected_as(even()) else { return };
+    pass(&camera, 100.0);
+    camera.with(Machine::stand_still);
+    pass(&camera, 700.0);
+    camera.connect();
+    let mut tapped = Tapped::new(camera.link());
+    let mut session = Session::open(tapped.link()).unwrap();
+    session.status(&mut IgnorePackets).unwrap();
+    let told = tapped.crashes();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("the watchdog restarted the chip"), "{told:?}");
     camera.assert_no_violation();
 }
 

@@ -5,7 +5,7 @@ use crate::camera::{BOARD, elf};
 use crate::chip::OnTheBus;
 use crate::chip::Ready;
 use crate::machine::Stop;
-use nirspi_wire::State;
+use nirspi_wire::{RebootInto, State};
 
 #[test]
 fn it_boots_and_a_host_enumerates_it_at_high_speed() {
@@ -45,6 +45,27 @@ fn the_watchdog_is_fed_in_time_and_the_stack_has_room_from_power_up_on() {
     camera.assert_no_violation();
 }
 
+/// From a reset to the answer to a host's greeting, at most. Before `main` the chip clears memory at 4 MHz, so a byte more
+/// of it takes 0.4 us: the staging memory of a bitstream alone would take 0.4 s.
+const START_BUDGET_US: f64 = 60_000.0;
+
+#[test]
+fn a_host_is_greeted_within_60_ms_of_a_reset() {
+    let Some(camera) = connected_as(even()) else { return };
+    drop(Session::open(camera.link()).unwrap());
+    let first = camera.with(|machine| machine.now_us());
+    let mut session = Session::open(camera.link()).unwrap();
+    session.command(request::Reboot(RebootInto::Application), &mut IgnorePackets).unwrap();
+    drop(session);
+    assert!(camera.with(|machine| machine.run_while(1e6, |chip| !chip.usb.is_configured())));
+    camera.connect();
+    drop(Session::open(camera.link()).unwrap());
+    let again = camera.with(|machine| machine.now_us() - machine.resets.last().unwrap().0 as f64);
+    println!("greeted {:.1} ms after power-up, {:.1} ms after a restart", first / 1e3, again / 1e3);
+    assert!(first < START_BUDGET_US && again < START_BUDGET_US, "{first} us, {again} us");
+    camera.assert_no_violation();
+}
+
 /// Each wait of the start, with what it waits for.
 const WAITS: &[Ready] = &[
     Ready("PWR.SVMSR", 26),
@@ -72,6 +93,26 @@ fn a_wait_of_the_start_that_never_ends_is_ended_by_the_watchdog_in_the_dark() {
         assert!(lit.is_empty(), "{wait:?}: {lit:?}");
         assert!(violations.is_empty(), "{wait:?}: {violations:?}");
     }
+}
+
+/// A start that gets nowhere is seen at the bench: every second restart lights LD3 from its beginning on.
+#[test]
+fn ld3_blinks_while_no_start_gets_further_than_its_waits() {
+    let stuck = Some(Ready("RCC.CR", 17));
+    let Some(camera) = Camera::start(Plan { stuck, ..even() }) else { return };
+    for expected in [false, true, false, true] {
+        let lamp = camera.with(|machine| {
+            machine.run_while(250_000.0, |_| false);
+            let lamp = machine.chip(|chip| {
+                let (port, bit) = chip.place("lamp_fault");
+                chip.level(port, bit)
+            });
+            assert!(matches!(machine.run_us(1e6), Stop::Reset(_)));
+            lamp
+        });
+        assert_eq!(lamp, expected);
+    }
+    camera.assert_no_violation();
 }
 
 #[test]

@@ -182,6 +182,7 @@ pub fn count<const N: usize>(runs: [(u32, u32); N]) -> [Cost; N] {
         info: BoardInfo::new("counted", "", Version(0, 0, 0)),
         limits: Limits::default(),
         crash: None,
+        restarts: 0,
     };
     let tasks = (
         usb::host(endpoints, commands, to_host),
