@@ -59,6 +59,8 @@ pub struct Plan {
     pub parallel: bool,
     pub on_the_bus: OnTheBus,
     pub stuck: Option<Ready>,
+    /// A register that reads with bits that never fall and bits that never rise: its address, and these bits.
+    pub frozen: Option<(u32, u32, u32)>,
     /// Bytes of stack that the processor begins with, in place of all.
     pub stack_room: Option<u32>,
     /// What becomes of a write to a register, by address and value: another value, or no write.
@@ -74,6 +76,7 @@ impl Plan {
             parallel: false,
             on_the_bus: OnTheBus::Nobody,
             stuck: None,
+            frozen: None,
             stack_room: None,
             mutation: |_, value| Some(value),
         }
@@ -103,6 +106,7 @@ impl Plan {
             configuration: Box::new(Ecp5::default()),
             on_the_bus: self.on_the_bus,
             stuck: self.stuck,
+            frozen: self.frozen,
             mutation: self.mutation,
         };
         let elf = if self.parallel { parallel_elf() } else { elf() };

@@ -51,6 +51,7 @@ pub const FLASH_ACR: u32 = 0x4002_2000;
 pub const PWR: u32 = 0x4602_0800;
 pub const GPIO: u32 = 0x4202_0000;
 pub const EXTI: u32 = 0x4602_2000;
+pub const ADC1: u32 = 0x4202_8000;
 pub const OCTOSPI1: u32 = 0x420D_1400;
 pub const OCTOSPIM: u32 = 0x420C_4000;
 pub const GPDMA1: u32 = 0x4002_0000;
@@ -219,7 +220,7 @@ pub const BLOCKS: &[Block] = &[
     port!("GPIOJ", 9, 0xFFFF_FFFF, 0, 0),
     Block {
         name: "ADC1",
-        base: 0x4202_8000,
+        base: ADC1,
         bytes: 0x100,
         clock: Some((AHB2ENR1, 10)),
         part: Part::Adc,

@@ -63,6 +63,8 @@ pub struct Connected {
     pub configuration: Box<dyn SpiDevice>,
     pub on_the_bus: OnTheBus,
     pub stuck: Option<Ready>,
+    /// A register that reads with bits that never fall and bits that never rise: its address, and these bits.
+    pub frozen: Option<(u32, u32, u32)>,
     /// What becomes of a write to a register, in a test of the rules: another value, or no write.
     pub mutation: fn(u32, u32) -> Option<u32>,
 }
@@ -93,6 +95,7 @@ pub struct Chip {
     fpga_looked_ps: u64,
     rising: clocks::Rising,
     pub stuck: Option<Ready>,
+    frozen: Option<(u32, u32, u32)>,
     mutation: fn(u32, u32) -> Option<u32>,
     pub supply_millivolts: u32,
     /// The option byte `BOR_LEV`.
@@ -141,7 +144,8 @@ impl Chip {
     /// After power-up.
     #[must_use]
     pub fn new(memory: Memory, usb: Usb, connected: Connected) -> Self {
-        let Connected { pins, fpga, configuration, on_the_bus, stuck, mutation } = connected;
+        let Connected { pins, fpga, configuration, on_the_bus, stuck, frozen, mutation } =
+            connected;
         let mut chip = Self {
             now: 0,
             values: HashMap::default(),
@@ -165,6 +169,7 @@ impl Chip {
             fpga_looked_ps: 0,
             rising: clocks::Rising::new(),
             stuck,
+            frozen,
             mutation,
             supply_millivolts: 3300,
             brown_out_level: 4,
@@ -279,6 +284,14 @@ impl Chip {
 
     /// The processor reads.
     pub fn read(&mut self, address: u32, bytes: u32) -> u32 {
+        let value = self.read_register(address, bytes);
+        match self.frozen {
+            Some((at, high, low)) if at == address => value & !low | high,
+            _ => value,
+        }
+    }
+
+    fn read_register(&mut self, address: u32, bytes: u32) -> u32 {
         if address >= CORE && !(0xE004_4000..0xE004_5000).contains(&address) {
             return self.read_system(address, bytes);
         }

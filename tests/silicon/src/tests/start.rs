@@ -3,7 +3,7 @@
 use super::*;
 use crate::camera::{BOARD, elf};
 use crate::chip::OnTheBus;
-use crate::chip::Ready;
+use crate::chip::{Ready, map};
 use crate::machine::Stop;
 use nirspi_wire::{RebootInto, State};
 
@@ -81,17 +81,28 @@ const WAITS: &[Ready] = &[
     Ready("ADC1.ISR", 0),
 ];
 
+/// Waits for a peripheral that is ready at once on a chip that is well: register, and the bits that never fall and never
+/// rise.
+const FROZEN: &[(&str, (u32, u32, u32))] = &[
+    ("a calibration of the ADC, ADC1.CR.ADCAL", (map::ADC1 + 0x08, 1 << 31, 0)),
+    ("OCTOSPI1.SR.BUSY", (map::OCTOSPI1 + 0x20, 1 << 5, 0)),
+    ("OTG_HS.GRSTCTL.AHBIDL", (map::OTG + 0x10, 0, 1 << 31)),
+    ("OTG_HS.GINTSTS.CMOD", (map::OTG + 0x14, 1, 0)),
+];
+
 #[test]
 fn a_wait_of_the_start_that_never_ends_is_ended_by_the_watchdog_in_the_dark() {
-    for wait in WAITS {
-        let Some(camera) = Camera::start(Plan { stuck: Some(*wait), ..even() }) else { return };
+    let stuck = WAITS.iter().map(|&wait| (format!("{wait:?}"), Some(wait), None));
+    let frozen = FROZEN.iter().map(|&(name, bits)| (name.to_owned(), None, Some(bits)));
+    for (wait, stuck, frozen) in stuck.chain(frozen) {
+        let Some(camera) = Camera::start(Plan { stuck, frozen, ..even() }) else { return };
         let (stop, lit, violations) = camera.with(|machine| {
             (machine.run_us(3e6), machine.chip(|chip| chip.light_log.clone()), machine.violations())
         });
         let is_ended = matches!(stop, Stop::Reset(_));
-        assert!(is_ended, "{wait:?}: {stop:?}");
-        assert!(lit.is_empty(), "{wait:?}: {lit:?}");
-        assert!(violations.is_empty(), "{wait:?}: {violations:?}");
+        assert!(is_ended, "{wait}: {stop:?}");
+        assert!(lit.is_empty(), "{wait}: {lit:?}");
+        assert!(violations.is_empty(), "{wait}: {violations:?}");
     }
 }
 
