@@ -60,7 +60,7 @@ pub use camera::Camera;
 pub use crash::{CRASH_WORDS, Crash};
 pub use host_port::{HostPort, PortBus, Target, Wanted};
 pub use lamps::{Lamps, RESTARTS_SHOWN, flashes};
-pub use limits::{BOARD_WATCHDOG_US, Limits, TEMPERATURE_PERIOD_US};
+pub use limits::{BOARD_WATCHDOG_US, CLOCK_CHECK, Limits, TEMPERATURE_PERIOD_US};
 pub use merge::Merger;
 pub use patience::{PATIENCE, Patience, Remedy};
 pub use ports::{

@@ -18,6 +18,20 @@ fn with_block(page: &str, name: &str, table: &str) -> String {
     format!("{before}{begin}\n{table}\n{end}{after}")
 }
 
+/// Lines of at most 100 characters, as every page has them.
+fn wrapped(sentence: &str) -> String {
+    let mut lines = vec![String::new()];
+    for word in sentence.split(' ') {
+        let line = lines.last().unwrap();
+        match (line.is_empty(), line.len() + 1 + word.len() <= 100) {
+            (true, _) => lines.last_mut().unwrap().push_str(word),
+            (false, true) => *lines.last_mut().unwrap() = format!("{line} {word}"),
+            (false, false) => lines.push(word.to_owned()),
+        }
+    }
+    lines.join("\n")
+}
+
 #[test]
 fn the_tables_of_the_page_are_those_of_the_command() {
     let path = root().join(PAGE);
@@ -25,7 +39,11 @@ fn the_tables_of_the_page_are_those_of_the_command() {
     let mut made = page.clone();
     for name in ["paper", "one-metre"] {
         let case = SafetyCase::of(&CameraModel::named(name).unwrap()).unwrap();
-        made = with_block(&made, &format!("light of {name}"), &case.exposure_table());
+        made = with_block(
+            &made,
+            &format!("light of {name}"),
+            &format!("{}\n{}\n", case.exposure_table(), wrapped(&case.risk_groups())),
+        );
         if name == "paper" {
             made = with_block(&made, "single faults", &case.fault_table());
         }
@@ -53,7 +71,7 @@ fn sources(folder: &Path, into: &mut String) {
 #[test]
 fn every_barrier_is_shown_by_a_test_or_proof_that_exists() {
     let mut text = String::new();
-    for folder in ["hdl", "mcu", "tests/tests", "boards"] {
+    for folder in ["hdl", "mcu", "tests/tests", "tests/silicon/src", "boards"] {
         sources(&root().join(folder), &mut text);
     }
     for fault in FAULTS {

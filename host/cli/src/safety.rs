@@ -29,6 +29,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.report.print_answer(&case, |case| {
         print::line(format_args!("camera {} (computed, not measured)\n", case.camera))?;
         print::line(case.exposure_table())?;
+        print::line(format_args!("{}\n", case.risk_groups()))?;
         print::line(case.fault_table().trim_end())
     })
 }

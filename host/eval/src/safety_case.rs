@@ -8,7 +8,8 @@ mod faults;
 
 use nirspi_optics::CameraModel;
 use nirspi_optics::safety::{
-    EyeSafety, OutsideTheLimits, eye_limit_w_per_m2, longest_for_eyes_s, longest_for_skin_s,
+    EyeSafety, OutsideTheLimits, RiskGroup, eye_limit_w_per_m2, longest_for_eyes_s,
+    longest_for_skin_s,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -52,8 +53,12 @@ pub struct SafetyCase {
     pub simulated: bool,
     /// The description's name.
     pub camera: String,
-    /// Light at each place, as designed and with every LED lit.
+    /// Light at each place, as designed, with the brightest order file, and with every LED lit.
     pub exposures: Vec<Exposure>,
+    /// Risk group of IEC 62471 with the brightest order file, 0.2 m before the lens.
+    pub risk_group: RiskGroup,
+    /// The same before the array, lens taken off.
+    pub risk_group_without_lens: RiskGroup,
     /// Single faults, one by one.
     pub faults: Vec<Consequence>,
 }
@@ -65,7 +70,8 @@ impl SafetyCase {
     /// [`OutsideTheLimits`], for a wavelength whose limits are not implemented.
     pub fn of(camera: &CameraModel) -> Result<Self, OutsideTheLimits> {
         let of_share = |lit: Lit| Ok((lit, EyeSafety::with_lit(camera, lit.share())?));
-        let lights = [of_share(Lit::Half)?, of_share(Lit::All)?];
+        let lights = [of_share(Lit::Half)?, of_share(Lit::Brightest)?, of_share(Lit::All)?];
+        let [_, (_, brightest), _] = lights;
         let exposures = lights.into_iter().flat_map(|(lit, light)| {
             [
                 ("at the lens", light.at_lens_w_per_m2),
@@ -94,6 +100,8 @@ impl SafetyCase {
             simulated: true,
             camera: camera.name.clone(),
             exposures: exposures.collect(),
+            risk_group: RiskGroup::of(brightest.at_200_mm_w_per_m2),
+            risk_group_without_lens: RiskGroup::of(brightest.before_array_w_per_m2),
             faults: faults.collect::<Result<_, _>>()?,
         })
     }
@@ -108,6 +116,15 @@ impl SafetyCase {
             format!("| {} | {} | {:.1} W/m² | {eyes} | {skin} |\n", at.lit, at.place, at.w_per_m2)
         });
         rows.fold(head.to_owned(), |table, row| table + &row)
+    }
+
+    /// The risk groups in a sentence.
+    #[must_use]
+    pub fn risk_groups(&self) -> String {
+        format!(
+            "By IEC 62471, at 0.2 m and with the brightest order file: {}; with the lens taken off: {}.",
+            self.risk_group, self.risk_group_without_lens
+        )
     }
 
     /// The single faults as a table in Markdown.
@@ -166,11 +183,17 @@ mod tests {
                 None => assert_eq!(found.fault.dark_after, DarkAfter::Never),
             }
         }
-        // By hand: 5 s with half of the LEDs lit, 163.4 W/m^2 of 18 000 / 5^0.75 = 5383 W/m^2.
+        // By hand: 5 s with 62.5 % of the LEDs lit, 204.3 W/m^2 of 18 000 / 5^0.75 = 5383 W/m^2.
         let silent = case.faults.iter().find(|found| found.fault.fault.contains("silent")).unwrap();
-        assert!((silent.share_of_limit.unwrap() / 0.03036 - 1.0).abs() < 0.01, "{silent:?}");
+        assert!((silent.share_of_limit.unwrap() / 0.03795 - 1.0).abs() < 0.01, "{silent:?}");
         // All LEDs: twice the light, 0.4 of the time.
         let all = case.exposures.iter().find(|at| at.lit == Lit::All).unwrap();
         assert!((all.longest_for_eyes_s.unwrap() / 209.5 - 1.0).abs() < 0.01, "{all:?}");
+        // 50.1 and 222.2 W/m^2 with half of the LEDs.
+        assert_eq!(case.risk_group, RiskGroup::Exempt);
+        assert_eq!(case.risk_group_without_lens, RiskGroup::Low);
+        // A shorted converter: 204.3 W/m^2, and 10.92 V in place of 1.42 V at each resistor.
+        let supply = case.faults.iter().find(|found| found.fault.lit == Lit::Overdriven).unwrap();
+        assert!((supply.at_lens_w_per_m2 / 1571.0 - 1.0).abs() < 0.01, "{supply:?}");
     }
 }

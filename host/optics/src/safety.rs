@@ -11,6 +11,8 @@
 //!
 //! For skin and longer exposures there is no limit: pain comes before damage.
 //!
+//! A risk group of IEC 62471 ([`RiskGroup`]) says for how long the eye's limit is not reached at 0.2 m: 1000, 100 or 10 s.
+//!
 //! From 1400 nm on the retina gets nothing, because the water of the eye absorbs the light. Below 1400 nm the retina has
 //! limits of its own (thermal; blue light below 700 nm), which depend on radiance and on the size of the source. These are
 //! not implemented, so a camera of such a wavelength is refused: [`OutsideTheLimits`].
@@ -71,6 +73,46 @@ pub fn longest_for_eyes_s(w_per_m2: f64) -> Option<f64> {
 pub fn longest_for_skin_s(w_per_m2: f64) -> Option<f64> {
     let longest = (SKIN / w_per_m2).powf(4.0 / 3.0);
     (longest < SKIN_LONGEST_S).then_some(longest)
+}
+
+/// The risk group of IEC 62471 (6.1) for the hazard of infrared light to cornea and lens. At wavelengths of
+/// [`WAVELENGTHS_NM`] no other hazard of the standard has a group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RiskGroup {
+    /// The limit is not reached within 1000 s, at which it is that of all longer times.
+    Exempt,
+    /// Not within 100 s.
+    Low,
+    /// Not within 10 s.
+    Moderate,
+    /// Within 10 s.
+    High,
+}
+
+/// The most irradiance of each group, in W/m^2 (IEC 62471, table 6).
+const GROUPS: [(RiskGroup, f64); 3] =
+    [(RiskGroup::Exempt, 100.0), (RiskGroup::Low, 570.0), (RiskGroup::Moderate, 3_200.0)];
+
+impl RiskGroup {
+    /// The group of a lamp with this irradiance at 0.2 m.
+    #[must_use]
+    pub fn of(w_per_m2_at_200_mm: f64) -> Self {
+        let found = GROUPS.iter().find(|(_, most)| w_per_m2_at_200_mm <= *most);
+        found.map_or(Self::High, |(group, _)| *group)
+    }
+}
+
+/// As the standard names it.
+impl Display for RiskGroup {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Exempt => "exempt group",
+            Self::Low => "risk group 1 (low risk)",
+            Self::Moderate => "risk group 2 (moderate risk)",
+            Self::High => "risk group 3 (high risk)",
+        })
+    }
 }
 
 /// The light of a camera at the places where eye and skin may be.
@@ -204,6 +246,20 @@ mod tests {
         // The skin: 20 000 J/m^2 t^0.25 in t seconds, that is 3557 W/m^2 for 10 s.
         assert_eq!(longest_for_skin_s(3_556.0), None);
         assert!((longest_for_skin_s(20_000.0).unwrap() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_risk_group_is_as_far_from_the_eyes_limit_as_the_standard_says() {
+        for (seconds, group) in
+            [(1_000.0, RiskGroup::Exempt), (100.0, RiskGroup::Low), (10.0, RiskGroup::Moderate)]
+        {
+            // The standard's table has two digits.
+            let limit = eye_limit_w_per_m2(seconds);
+            assert_eq!(RiskGroup::of(0.98 * limit), group, "{limit}");
+            assert!(RiskGroup::of(1.02 * limit) > group, "{limit}");
+        }
+        assert_eq!(RiskGroup::of(0.0), RiskGroup::Exempt);
+        assert_eq!(RiskGroup::of(1e6).to_string(), "risk group 3 (high risk)");
     }
 
     #[test]

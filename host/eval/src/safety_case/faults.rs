@@ -4,10 +4,10 @@
 //! exist. The electronics of the array are computed and were never built, so their barriers are
 //! named as an addition and no time rests on them.
 
-use nirspi_mcu::{BOARD_WATCHDOG_US, Limits, TEMPERATURE_PERIOD_US};
+use nirspi_mcu::{BOARD_WATCHDOG_US, CLOCK_CHECK, Limits, TEMPERATURE_PERIOD_US};
 use nirspi_wire::ADC_HZ;
 use nirspi_wire::message::HOST_SILENCE_US;
-use nirspi_wire::register::DUTY_WINDOW;
+use nirspi_wire::register::{DUTY_LIMIT_MAX, DUTY_WINDOW};
 use serde::{Serialize, Serializer};
 use std::fmt::{self, Display};
 
@@ -19,11 +19,19 @@ pub enum Lit {
     None,
     /// One.
     One,
-    /// Half, as in every sweep.
+    /// Half, as in every sweep of patterns and complements.
     Half,
+    /// The most that firmware and gateware allow, which an order file may ask for.
+    Brightest,
     /// All.
     All,
+    /// The brightest order file, with all of the supply's voltage behind the converter at the LEDs.
+    Overdriven,
 }
+
+/// How much more current an LED of the array gets at 12 V than at 2.5 V: 1.08 V fall off at the LED, the rest at its
+/// resistor of 27 ohm (`boards/electronics/supply.cir`). Light grows no faster than the current.
+const OVERDRIVE: f64 = (12.0 - 1.08) / (2.5 - 1.08);
 
 impl Lit {
     /// Share of the array.
@@ -33,7 +41,9 @@ impl Lit {
             Self::None => 0.0,
             Self::One => 1.0 / nirspi_optics::LEDS as f64,
             Self::Half => 0.5,
+            Self::Brightest => f64::from(DUTY_LIMIT_MAX) / (2.0 * f64::from(DUTY_WINDOW)),
             Self::All => 1.0,
+            Self::Overdriven => OVERDRIVE * Self::Brightest.share(),
         }
     }
 }
@@ -44,7 +54,9 @@ impl Display for Lit {
             Self::None => "none",
             Self::One => "one",
             Self::Half => "half",
+            Self::Brightest => "62.5 %",
             Self::All => "all",
+            Self::Overdriven => "62.5 %, at up to 7.7 times the current",
         })
     }
 }
@@ -130,14 +142,54 @@ const HOST_SILENCE: DarkAfter = DarkAfter::Microseconds(HOST_SILENCE_US);
 /// The next reading shows a broken sensor.
 const TEMPERATURE: DarkAfter = DarkAfter::Microseconds(TEMPERATURE_PERIOD_US);
 
-/// Every single fault that the safety case treats, from the FPGA to the array.
+/// The next look at the frequency of the ADC's clock, and the poll that makes it.
+const ADC_CLOCK: DarkAfter =
+    DarkAfter::Microseconds(CLOCK_CHECK.0 + Limits::REFERENCE.running_check.0);
+
+/// Every single fault that the safety case treats, from the FPGA to the array. Lit is what the brightest order file lights,
+/// unless the fault itself says more.
 pub const FAULTS: &[SingleFault] = &[
     fault(
         "the ADC's clock stops, and the sequencer with it",
-        Lit::Half,
+        Lit::Brightest,
         "the FPGA's clock guard pulls its LED enable low",
         CLOCK_GUARD,
         &["clock_guard_proof", "shell_proof", "an_adc_clock_that_is_lost_and_comes_back"],
+    ),
+    fault(
+        "the ADC's clock has another frequency, and stretches the FPGA's watchdog and its patterns",
+        Lit::Brightest,
+        "the firmware judges the frequency and pulls its LED enable low",
+        ADC_CLOCK,
+        &["an_adc_clock_of_another_frequency"],
+    ),
+    fault(
+        "the microcontroller's crystal stops",
+        Lit::Brightest,
+        "the processor stands still: the FPGA's watchdog ends the run, the board's watchdog, which has an oscillator of its own, \
+         restarts the chip, whose LED enable is low after a reset",
+        FPGA_WATCHDOG,
+        &[
+            "the_gateware_goes_dark_when_the_firmware_hangs",
+            "a_wait_of_the_start_that_never_ends_is_ended_by_the_watchdog_in_the_dark",
+        ],
+    ),
+    fault(
+        "the FPGA's own oscillator stops, and the host port with it",
+        Lit::Brightest,
+        "the firmware finds no FPGA and pulls its LED enable low",
+        CHECK,
+        &["a_dead_bus_is_an_absent_fpga_and_is_told_again_to_stop_on_every_poll"],
+    ),
+    fault(
+        "the supply of the microcontroller sags or fails",
+        Lit::None,
+        "its brown-out reset or voltage detector: the LED enable is low in reset",
+        DarkAfter::AtOnce,
+        &[
+            "a_brown_out_while_lit_is_dark_at_once_and_the_next_host_is_told_of_it_once",
+            "a_supply_that_sags_while_lit_is_dark_at_once_and_stays_dark",
+        ],
     ),
     fault(
         "the FPGA loses its supply or configuration",
@@ -166,7 +218,7 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the FPGA's LED enable is stuck high",
-        Lit::Half,
+        Lit::Brightest,
         "the LED lines are low outside a run; the run ends as always, at the latest when the host falls silent",
         HOST_SILENCE,
         &["a_silent_host", "no_light_with_a_fault_latched_an_open_interlock_or_no_run"],
@@ -183,14 +235,14 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the firmware hangs",
-        Lit::Half,
+        Lit::Brightest,
         "the FPGA's watchdog ends the run; the board's watchdog restarts the firmware",
         FPGA_WATCHDOG,
         &["the_gateware_goes_dark_when_the_firmware_hangs", "dark_when_host_silent"],
     ),
     fault(
         "the firmware hangs while it still reads the FPGA",
-        Lit::Half,
+        Lit::Brightest,
         "the board's watchdog restarts the firmware, whose LED enable is low after a reset",
         BOARD_WATCHDOG,
         &["a_watchdog_runs_before_anything_waits", "the_cameras_loop_alone_feeds_the_watchdog"],
@@ -207,14 +259,14 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the microcontroller's LED enable is stuck high",
-        Lit::Half,
+        Lit::Brightest,
         "the FPGA's enable falls with every end of a run, at the latest when the host falls silent",
         HOST_SILENCE,
         &["a_silent_host", "each_fault_that_the_fpga_latches"],
     ),
     fault(
         "the bus between microcontroller and FPGA is cut",
-        Lit::Half,
+        Lit::Brightest,
         "the firmware finds no FPGA and pulls its LED enable low",
         CHECK,
         &["a_dead_bus_is_an_absent_fpga_and_is_told_again_to_stop_on_every_poll"],
@@ -231,21 +283,21 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the temperature sensor is shorted or open",
-        Lit::Half,
+        Lit::Brightest,
         "the reading is not plausible: the firmware's fault pulls its LED enable low",
         TEMPERATURE,
         &["a_sensor_that_reads_what_cannot_be", "a_sensor_that_does_not_answer"],
     ),
     fault(
         "the temperature sensor reads a wrong but plausible value",
-        Lit::Half,
+        Lit::Brightest,
         "nothing: the LEDs may get too hot; their light is as designed. Add a thermal fuse in the LED supply",
         DarkAfter::Never,
         &[],
     ),
     fault(
         "the interlock's switch is stuck closed",
-        Lit::Half,
+        Lit::Brightest,
         "nothing sees an open enclosure. Add a second switch in series",
         DarkAfter::Never,
         &[],
@@ -262,21 +314,21 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the host is silent and stays connected",
-        Lit::Half,
+        Lit::Brightest,
         "the firmware's fault switches the LEDs off",
         HOST_SILENCE,
         &["a_silent_host"],
     ),
     fault(
         "the host reads nothing and goes on to send",
-        Lit::Half,
+        Lit::Brightest,
         "the firmware ends the session",
         HOST_SILENCE,
         &["a_transfer_may_wait_as_long_as_a_silent_host"],
     ),
     fault(
         "the array's AND gate is stuck high",
-        Lit::Half,
+        Lit::Brightest,
         "the LED lines are low outside a run; the run ends as always (and the interlock cuts the supply)",
         HOST_SILENCE,
         &["a_silent_host"],
@@ -285,6 +337,13 @@ pub const FAULTS: &[SingleFault] = &[
         "one LED's transistor is shorted",
         Lit::One,
         "nothing but the interlock, which cuts the supply",
+        DarkAfter::Never,
+        &[],
+    ),
+    fault(
+        "the array's converter is shorted, or its feedback is open: 12 V at the LEDs in place of 2.5 V",
+        Lit::Overdriven,
+        "nothing but the interlock, which cuts the supply, or LEDs that break. Add a fuse and a clamp behind the converter",
         DarkAfter::Never,
         &[],
     ),
