@@ -6,12 +6,15 @@
     python3 hdl/build.py --seeds 1                   # quicker
 
 Synthesises `hdl/sv` with the board's top (yosys), places and routes it once a seed (nextpnr), packs the seed
-with the best margin (ecppack). Exits 1 when a seed misses a clock's frequency and margin.
+with the best margin (ecppack). Exits 1 when a seed misses a clock's frequency and margin, when a path from clock to clock
+is too long, when the bitstream is longer than a microcontroller's board takes, or when the page of figures
+(docs/gateware.md) is not of this build; NIRSPI_BLESS=1 writes the page's.
 Needs Python 3.9 or later and, the first time, PyPI. The bitstream is never committed.
 """
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import time
@@ -24,6 +27,9 @@ from tools import HDL, ROOT, TARGET, tool
 # The 64 LED pins are on three sides of the chip and draw the logic apart; at nextpnr's own weight of timing
 # against wire length (10) it gives way to them and comes out at 113 MHz.
 TIMING_WEIGHT = 300
+
+# Where seed 1 of each board has its figures.
+PAGE = ROOT / "docs" / "gateware.md"
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,50 @@ def fmax_mhz(report: dict, clock: Clock) -> float:
     sys.exit(f"no clock {clock.net} among {', '.join(report['fmax'])}")
 
 
+def crossings(report: dict, board: Board) -> list[tuple[str, float, float]]:
+    """From clock to clock: the longest path in ns, and the most that it may have.
+
+    What crosses on several wires stands still until a toggle has passed two registers of the other clock, and pointers
+    of a FIFO are in Gray code. Both are right if no wire is later than another by a period of the faster clock: a path
+    that is no longer than that period cannot be.
+    """
+    found = []
+    for path in report["critical_paths"]:
+        ends = [path[end].split()[-1].replace("$", " ").split() for end in ("from", "to")]
+        if ends[0] == ends[1] or not all(set(end) - {"<async>"} for end in ends):
+            continue
+        clocks = [clock for clock in board.clocks if any(clock.net in end for end in ends)]
+        names = [next((word for word in end if word not in ("glbnet", "TRELLIS_IO_IN")), "?") for end in ends]
+        most = min(1e3 / clock.mhz for clock in clocks)
+        found.append((" to ".join(f"`{name}`" for name in names), sum(step["delay"] for step in path["path"]), most))
+    return found
+
+
+def figures(report: dict, board: Board) -> str:
+    """What the page says of seed 1, as a table in Markdown."""
+    rows = ["| seed 1 | reached | must be |", "| -- | -- | -- |"]
+    for clock in board.clocks:
+        rows.append(f"| `{clock.net}` | {fmax_mhz(report, clock):.1f} MHz | over {clock.needed_mhz:.1f} MHz |")
+    for name, ns, most in crossings(report, board):
+        rows.append(f"| longest path from {name} | {ns:.1f} ns | under {most:.1f} ns |")
+    for name in RESOURCES:
+        used = report["utilization"][name]
+        if used["used"]:
+            rows.append(f"| {name} | {used['used']} | at most {used['available']} |")
+    return "\n".join(rows)
+
+
+def hold_page(table: str, board: str) -> None:
+    """Compares the table with the page's, or writes it there with NIRSPI_BLESS=1."""
+    begin, end = f"<!-- figures of {board} -->\n", f"<!-- end of figures of {board} -->"
+    before, rest = PAGE.read_text().split(begin)
+    old, after = rest.split(end)
+    if "NIRSPI_BLESS" in os.environ:
+        PAGE.write_text(f"{before}{begin}\n{table}\n\n{end}{after}")
+    elif old.strip() != table:
+        sys.exit(f"{PAGE.relative_to(ROOT)} is not of this build, which has:\n\n{table}\n\nNIRSPI_BLESS=1 python3 hdl/build.py --board {board} --seeds 1 writes it")
+
+
 def staging_bytes() -> dict[str, int]:
     """The longest bitstream that a host can load through each microcontroller's board, as its board.toml says."""
     key = "staging_bytes = "
@@ -184,6 +234,11 @@ def main() -> None:
     bitstream = out / "nirspi.bit"
     run(out / "ecppack.log", tool("yowasp-ecppack"), "--compress", out / f"seed{best}.config", bitstream)
     print(f"\n{bitstream} (seed {best}, {bitstream.stat().st_size} bytes), {time.monotonic() - began:.0f} s")
+    hold_page(figures(reports[0], board), asked.board)
+    for seed, report in zip(seeds, reports):
+        for name, ns, most in crossings(report, board):
+            if ns > most:
+                sys.exit(f"seed {seed}: the longest path from {name} takes {ns:.1f} ns, expected under {most:.1f}")
     for name, most in staging_bytes().items():
         if bitstream.stat().st_size > most:
             sys.exit(f"the bitstream does not fit into the memory of {name}, which takes {most} bytes: boards/{name}/board.toml, staging_bytes")
