@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn restarts_that_no_host_asked_for_are_counted_since_power_up() {
-        for memory in [[0; 2], [0xA5A5_A5A5; 2], [7, 7], [u32::MAX; 2]] {
+        for memory in [[0; 2], [0xA5A5_A5A5; 2], [7, 7], [u32::MAX; 2], [1, 2]] {
             assert_eq!(restarts(memory, false), None, "{memory:x?}");
         }
         let mut words = restart_words(0);
