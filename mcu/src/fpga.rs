@@ -46,6 +46,9 @@ const FOREIGN: Fault = Fault::FpgaAbsent { identity: IDENTITY };
 /// Fault of an FPGA whose ADC has no clock, or one of another frequency.
 pub(crate) const WRONG_CLOCK: Fault = Fault::FpgaAbsent { identity: NO_CLOCK };
 
+/// Fault of an FPGA from which everything comes damaged.
+pub(crate) const UNREADABLE: Fault = Fault::FpgaAbsent { identity: DAMAGED };
+
 /// The fault of an access that failed. Accesses to gateware of another version fail as if they were
 /// damaged, because that gateware checks none.
 ///
@@ -59,7 +62,7 @@ pub(crate) fn failed(error: BusError, bus: &mut impl FpgaBus) -> Fault {
     match (read(bus, Register::Identity), read(bus, Register::Version)) {
         (Ok(IDENTITY), Ok(version)) if !has_this_map(version) => FOREIGN,
         (Ok(identity), _) if identity != IDENTITY => Fault::FpgaAbsent { identity },
-        _ => Fault::FpgaAbsent { identity: DAMAGED },
+        _ => UNREADABLE,
     }
 }
 

@@ -12,6 +12,9 @@
 //! frame. When a packet of the parallel port is looked at, the registers are already those of a frame that the FPGA
 //! sends after it; between two frames the registers hold 0, and the meter measures nothing.
 //!
+//! The first packets of a run are also the training of the port that carries them: where none of them arrives whole, the port
+//! is sampled at the wrong phase or its wires are bad, and the run ends ([`Meter::has_no_whole_packet`]).
+//!
 //! # Invariant
 //! No frame passes through floating point (`tests/tests/budgets.rs`:
 //! `only_the_telemetry_computes_with_floating_point`).
@@ -27,6 +30,9 @@ const PERIOD: Micros = Micros(250_000);
 
 /// Most frames from the first of a pair to the second.
 const APART: u32 = 8;
+
+/// A run ends if so many packets were looked at, from its first on, and all of them were damaged.
+const TRAINING: u8 = 8;
 
 /// Bits of a reading as the meter keeps it, sign included: the squares of 1024 differences of two
 /// such readings fit in 64 bits.
@@ -78,12 +84,14 @@ pub(crate) struct Meter {
     exposure: Exposure,
     pair: Pair,
     last: Option<Tally>,
+    /// Damaged packets from the beginning of the run on; `None` once a packet has come whole.
+    damaged: Option<u8>,
 }
 
 impl Meter {
     pub const fn new() -> Self {
         let exposure = Exposure { samples: 0, halves: 1, clocks: 0 };
-        Self { exposure, pair: Pair::Due(Micros(0)), last: None }
+        Self { exposure, pair: Pair::Due(Micros(0)), last: None, damaged: Some(0) }
     }
 
     /// Forgets what the run before has shown.
@@ -91,6 +99,17 @@ impl Meter {
         self.exposure = Exposure::of(setup);
         self.pair = Pair::Due(now);
         self.last = None;
+        self.damaged = Some(0);
+    }
+
+    /// Whether no packet of this run has come whole, of enough to say so.
+    pub fn has_no_whole_packet(&self) -> bool {
+        self.damaged.is_some_and(|damaged| damaged >= TRAINING)
+    }
+
+    /// Notes whether a packet has come whole.
+    pub fn judge(&mut self, whole: bool) {
+        self.damaged = self.damaged.filter(|_| !whole).map(|damaged| damaged.saturating_add(1));
     }
 
     /// Whether [`look`](Self::look) would read a packet now.
@@ -128,7 +147,9 @@ impl Meter {
                 return;
             }
             let tally = self.tally(&mut || reader.sample(), memory);
-            if let (true, Ok((levels, over_range))) = (reader.is_intact(), measures(bus)) {
+            let whole = reader.is_intact();
+            self.judge(whole);
+            if let (true, Ok((levels, over_range))) = (whole, measures(bus)) {
                 self.last = Some(Tally { levels, over_range, ..tally });
             }
         } else {
@@ -136,7 +157,9 @@ impl Meter {
             for word in words {
                 *word = reader.sample().to_le_bytes();
             }
-            if counts && reader.is_intact() {
+            let whole = reader.is_intact();
+            self.judge(whole);
+            if counts && whole {
                 self.pair = Pair::Begun { sequence, at: now };
             }
         }

@@ -85,6 +85,9 @@ impl Machine {
                 {
                     return self.trip(now, fault, bus);
                 }
+                if self.meter.has_no_whole_packet() {
+                    return self.trip(now, fpga::UNREADABLE, bus);
+                }
                 // A second look: one wrong bit must not end a run.
                 let over = |status: u32| status & status::RUNNING == 0;
                 if over(status) && fpga::health(bus).is_ok_and(over) {

@@ -355,7 +355,10 @@ impl Run {
                     sink.commit(place);
                     &mut counters.sent
                 }
-                None if has_room => &mut counters.corrupt,
+                None if has_room => {
+                    meter.judge(false);
+                    &mut counters.corrupt
+                }
                 None => &mut counters.dropped,
             };
             *count = count.wrapping_add(1);

@@ -5,9 +5,11 @@ use super::support::*;
 use crate::Micros;
 use nirspi_wire::host_port::READ_PACKET;
 use nirspi_wire::ready;
-use nirspi_wire::register::{Register, mode};
+use nirspi_wire::register::{DAMAGED, Register, mode};
 use nirspi_wire::samples::Width;
-use nirspi_wire::{Answer, Command, Configuration, DeviceMessage, Frame, RunLength, Signal, State};
+use nirspi_wire::{
+    Answer, Command, Configuration, DeviceMessage, Fault, Frame, RunLength, Signal, State,
+};
 use std::vec::Vec;
 
 fn running() -> Bench {
@@ -219,9 +221,35 @@ fn bytes_without_a_packet_count_as_damaged() {
     }
 }
 
+/// As of a port that is sampled at the wrong phase.
+#[test]
+fn a_run_whose_first_packets_all_come_damaged_ends_and_a_whole_one_is_enough() {
+    let fault = Fault::FpgaAbsent { identity: DAMAGED };
+    let spoils: [fn(&mut Vec<u8>); 2] = [|frame| frame[40] ^= 1, |frame| frame.fill(0)];
+    for (spoil, whole) in spoils.into_iter().flat_map(|spoil| [(spoil, None), (spoil, Some(6))]) {
+        let mut bench = running();
+        for packet in 0..20 {
+            bench.fpga.make_frame();
+            if Some(packet) != whole {
+                spoil(bench.fpga.frame.as_mut().unwrap());
+            }
+            bench.after(1_000);
+            let ended = whole.is_none() && packet >= 8;
+            assert!(ended || packet == 7 || bench.camera.state() == State::Running, "{packet}");
+            if ended {
+                break;
+            }
+        }
+        bench.link.packets.clear();
+        assert_eq!(bench.status().fault, Some(fault).filter(|_| whole.is_none()), "{whole:?}");
+        assert_eq!(bench.fpga.leds_on(), whole.is_some());
+    }
+}
+
 #[test]
 fn packets_that_cannot_be_found_are_no_reason_for_a_stall_and_silence_is() {
     let mut bench = running();
+    bench.frame();
     for _ in 0..10 {
         bench.fpga.make_frame();
         bench.fpga.frame.as_mut().unwrap().fill(0);
