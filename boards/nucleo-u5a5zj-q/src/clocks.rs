@@ -2,7 +2,7 @@
 //! crystal.
 
 use embassy_stm32::Config;
-use embassy_stm32::pac::{FLASH, ICACHE, PWR};
+use embassy_stm32::pac::{FLASH, ICACHE, PWR, RCC};
 use embassy_stm32::rcc::{
     Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale, mux,
 };
@@ -38,6 +38,13 @@ pub fn start_watchdog() {
     // A debugger that stops the processor stops the watchdog too; the FPGA's own ends a run then.
     DBGMCU.apb1lfzr().modify(|freeze| freeze.set_dbg_iwdg_stop(true));
     IWDG.kr().write(|key| key.set_key(Key::START));
+}
+
+/// Lets the chip watch the crystal. When the crystal stops, the chip goes over to its own oscillator and enters
+/// `NonMaskableInt`, which ends the firmware (`crash.rs`). Otherwise a PLL without its input would coast, and the time by which
+/// the firmware judges everything would run slow.
+pub fn watch_crystal() {
+    RCC.cr().modify(|control| control.set_csson(true));
 }
 
 /// Enables the instruction cache: flash needs four wait states, the cache mostly none (RM0456, 8).

@@ -66,6 +66,13 @@ mod entry {
             fault = sym super::fault,
         )
     }
+
+    /// The clock security system ([`clocks::watch_crystal`](crate::clocks::watch_crystal)): the crystal has stopped, and
+    /// the chip runs by its own oscillator.
+    #[unsafe(export_name = "NonMaskableInt")]
+    extern "C" fn crystal_stopped() -> ! {
+        super::die(format_args!("the crystal stopped"))
+    }
 }
 
 /// Takes the processor's exception frame: r0 to r3, r12, lr, pc, psr (ARMv7-M ARM, B1.5.6).

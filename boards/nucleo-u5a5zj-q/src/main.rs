@@ -107,6 +107,7 @@ async fn main(spawner: Spawner) {
     let pins = pins::take_pins!(p);
     let led_enable = Output::new(pins.led_enable, Level::Low, Speed::Low);
     crash::on_crash(pins::leds_off);
+    clocks::watch_crystal();
     clocks::enable_cache();
     clocks::watch_supply();
     clocks::wait_for_supply();

@@ -334,6 +334,16 @@ impl Machine {
         self.derail(last);
     }
 
+    /// The crystal stops. A processor without its clock security system stands still.
+    pub fn stop_crystal(&mut self) {
+        if self.chip(Chip::stop_crystal) {
+            self.bus().new_clock(4e6);
+            self.derail(self.vector(2));
+        } else {
+            self.stand_still();
+        }
+    }
+
     /// How deep the stack has been, in bytes, and how deep it may be.
     #[must_use]
     pub fn deepest_stack(&self) -> (u32, u32) {

@@ -165,14 +165,10 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the microcontroller's crystal stops",
-        Lit::Brightest,
-        "the processor stands still: the FPGA's watchdog ends the run, the board's watchdog, which has an oscillator of its own, \
-         restarts the chip, whose LED enable is low after a reset",
-        FPGA_WATCHDOG,
-        &[
-            "the_gateware_goes_dark_when_the_firmware_hangs",
-            "a_wait_of_the_start_that_never_ends_is_ended_by_the_watchdog_in_the_dark",
-        ],
+        Lit::None,
+        "the chip goes over to its own oscillator, and the crash handler pulls the LED enable low first",
+        DarkAfter::AtOnce,
+        &["a_crystal_that_stops_while_lit_is_dark_at_once_and_the_next_host_is_told_of_it"],
     ),
     fault(
         "the FPGA's own oscillator stops, and the host port with it",

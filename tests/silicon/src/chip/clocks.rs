@@ -202,6 +202,19 @@ impl Chip {
         if control >> 4 & 1 == 1 { levels[(control >> 5 & 7) as usize] } else { 0 }
     }
 
+    /// The crystal stops. Whether the clock security system sees that, which goes over to MSIS and raises the interrupt that
+    /// nothing masks (RM0456, 11.4.9).
+    pub fn stop_crystal(&mut self) -> bool {
+        let is_watched = self.value(RCC) >> 19 & 1 == 1;
+        for bit in [17, 25] {
+            self.rising.remove(&Ready("RCC.CR", bit));
+        }
+        if is_watched {
+            self.core = 4e6;
+        }
+        is_watched
+    }
+
     /// Whether the supply is below the brown-out level, where the chip is held in reset (data sheet, table 35, falling).
     #[must_use]
     pub fn is_browned_out(&self) -> bool {

@@ -14,9 +14,14 @@ pub const AT_ONCE_US: f64 = 10.0;
 
 /// Crashes a camera that is lit; returns the time until it is dark.
 pub fn dark_after_a_crash_us(camera: &Camera) -> f64 {
-    camera.with(|machine| {
+    dark_after_us(camera, |machine| machine.derail(NOWHERE))
+}
+
+/// The time until a camera that is lit is dark.
+fn dark_after_us(camera: &Camera, what: fn(&mut Machine)) -> f64 {
+    camera.with(move |machine| {
         let before = machine.now_us();
-        machine.derail(NOWHERE);
+        what(machine);
         machine.run_while(1_000.0, |chip| !chip.is_lit());
         let (fell, lit) = machine.chip(|chip| chip.light_log.last().copied()).unwrap();
         assert!(!lit);
@@ -212,6 +217,29 @@ fn a_firmware_that_stands_still_is_restarted_and_the_next_host_is_told_by_what()
     let told = tapped.crashes();
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains("the watchdog restarted the chip"), "{told:?}");
+    camera.assert_no_violation();
+}
+
+#[test]
+fn a_crystal_that_stops_while_lit_is_dark_at_once_and_the_next_host_is_told_of_it() {
+    let Some(camera) = connected_as(even()) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    start(&mut session, &natural());
+    pass(&camera, 2.0);
+    assert!(is_lit(&camera));
+    let dark_us = dark_after_us(&camera, Machine::stop_crystal);
+    // The chip's own oscillator is 40 times slower.
+    assert!(dark_us < 10.0 * AT_ONCE_US, "{dark_us} us");
+    drop(session);
+    pass(&camera, 5.0);
+    camera.connect();
+    let mut tapped = Tapped::new(camera.link());
+    let mut session = Session::open(tapped.link()).unwrap();
+    session.status(&mut IgnorePackets).unwrap();
+    let told = tapped.crashes();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("the crystal stopped"), "{told:?}");
+    println!("dark {dark_us:.1} us after the crystal stopped");
     camera.assert_no_violation();
 }
 
