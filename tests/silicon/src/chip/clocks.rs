@@ -202,7 +202,7 @@ impl Chip {
         if control >> 4 & 1 == 1 { levels[(control >> 5 & 7) as usize] } else { 0 }
     }
 
-    /// The crystal stops. Whether the clock security system sees that, which goes over to MSIS and raises the interrupt that
+    /// The crystal stops. Whether the clock security system sees that, which goes over to 4 MHz and raises the interrupt that
     /// nothing masks (RM0456, 11.4.9).
     pub fn stop_crystal(&mut self) -> bool {
         let is_watched = self.value(RCC) >> 19 & 1 == 1;
