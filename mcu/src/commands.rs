@@ -119,6 +119,8 @@ impl Machine {
             self.trip(now, fault, bus);
             return Err(Refusal::Fault(fault));
         }
+        // Simulated gateware may have had no time to count.
+        self.clock_counts = fpga::check_clock(bus).is_ok();
         self.loading = None;
         self.setup = None;
         if bus.ring().is_some() {

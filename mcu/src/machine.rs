@@ -59,6 +59,9 @@ pub(crate) struct Machine {
     pub reboot: Option<RebootInto>,
     /// The crash that ended the last start, until a host has got the crash report.
     pub crash: Option<Crash>,
+    /// The last configuration has seen the right frequency of the ADC's clock, so that another one while LEDs are lit is a
+    /// fault.
+    pub clock_counts: bool,
     /// Restarts of the chip since power-up that no host asked for.
     pub restarts: u8,
     pub commands_damaged: u32,
@@ -90,6 +93,7 @@ impl Machine {
             loading: None,
             reboot: None,
             crash: None,
+            clock_counts: false,
             restarts: 0,
             commands_damaged: 0,
             last_command: Micros(0),
