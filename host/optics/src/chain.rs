@@ -466,6 +466,15 @@ impl Chain {
         Ok(chain)
     }
 
+    /// Settles in the dark (and daylight), as between two runs.
+    pub fn rest(&mut self) {
+        let ChainSettings { sample_ns, led, ambient_electrons, dark_electrons, .. } = self.settings;
+        (self.led_electrons, self.amplified_electrons) = (0.0, 0.0);
+        self.pools = Pools::of(&led, sample_ns, self.settings.amplifier_tau_ns());
+        let dark = self.convert(ambient_electrons + dark_electrons);
+        self.pipeline.fill(dark);
+    }
+
     /// The settings it was made with.
     #[must_use]
     pub fn settings(&self) -> &ChainSettings {

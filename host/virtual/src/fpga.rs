@@ -51,6 +51,8 @@ struct Detector {
     chain: Chain,
     /// The lines whose light the chain holds; `None` if the light has changed without them.
     shown: Option<Lines>,
+    /// Whether there was light since the chain has rested.
+    lit: bool,
 }
 
 impl Detector {
@@ -58,7 +60,7 @@ impl Detector {
     fn new(array: LedArray, chain: Chain) -> Self {
         let mut gateware = Gateware::new();
         gateware.set_interlock(true);
-        Self { gateware, array, chain, shown: None }
+        Self { gateware, array, chain, shown: None, lit: false }
     }
 
     /// Changes what is in front of the LEDs.
@@ -108,9 +110,25 @@ impl Detector {
     fn advance_with(&mut self, clocks: u64, sample: impl Fn(&mut Self, Lines) -> AdcSample) {
         for _ in 0..clocks {
             // The ADC is not read outside a run, and drawing its noise is most of the work.
-            let sample =
-                if self.gateware.running() { sample(self, self.gateware.lines()) } else { DARK };
+            let sample = if self.gateware.running() {
+                self.lit = true;
+                sample(self, self.gateware.lines())
+            } else {
+                self.rest();
+                DARK
+            };
             self.gateware.tick(sample);
+        }
+    }
+
+    /// What is seen of the light between two runs: the next one begins in the dark.
+    #[inline]
+    fn rest(&mut self) {
+        if std::mem::take(&mut self.lit) {
+            let Lines { rows, columns, .. } = self.gateware.lines();
+            self.array.step(rows, columns, false);
+            self.shown = None;
+            self.chain.rest();
         }
     }
 }
@@ -236,7 +254,13 @@ impl OpticalFpga {
 
     /// One clock.
     fn tick(&mut self) {
-        let sample = if self.running() { self.sample() } else { DARK };
+        let sample = if self.running() {
+            self.detector.lit = true;
+            self.sample()
+        } else {
+            self.detector.rest();
+            DARK
+        };
         self.detector.gateware.tick(sample);
     }
 
