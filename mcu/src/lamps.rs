@@ -11,7 +11,7 @@ use nirspi_wire::Fault;
 const BEAT_US: u64 = 250_000;
 /// How long a short flash is on, which counts a restart.
 const SHORT_US: u64 = 50_000;
-/// More restarts show as so many.
+/// More restarts show as this number.
 pub const RESTARTS_SHOWN: u8 = 10;
 /// Beats without a flash after the flashes of a fault, so that a person can count them.
 const PAUSE_BEATS: u64 = 5;

@@ -31,7 +31,7 @@ const PERIOD: Micros = Micros(250_000);
 /// Most frames from the first of a pair to the second.
 const APART: u32 = 8;
 
-/// A run ends if so many packets were looked at, from its first on, and all of them were damaged.
+/// A run ends if the first packets of it, this many, were looked at and all of them were damaged.
 const TRAINING: u8 = 8;
 
 /// Bits of a reading as the meter keeps it, sign included: the squares of 1024 differences of two

@@ -63,7 +63,7 @@ pub fn begin() -> Start {
     }
 }
 
-/// Notes that the firmware runs, so many milliseconds after its start.
+/// Notes that the firmware runs, and how long after its start, in milliseconds.
 pub fn is_alive(ms: u32) {
     ALIVE_MS.store(ms, Ordering::Relaxed);
 }

@@ -131,6 +131,12 @@ impl Integrated {
         self.warnings_of_flags().into_iter().chain(smeared).collect()
     }
 
+    /// What frames' flags and the run tell of the measurement, whatever picture is made of it.
+    #[must_use]
+    pub fn what_happened(&self) -> Vec<String> {
+        self.warnings_of_flags().into_iter().chain(self.said_of_change()).collect()
+    }
+
     /// By how much the scene's readings changed while several frames were taken: their variance over the run as a share of
     /// their variation from pattern to pattern. `None` if they did not change, or of one frame.
     #[must_use]

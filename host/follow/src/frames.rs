@@ -18,12 +18,12 @@ const GROUPS: usize = 8;
 const SURE: f64 = 3.5;
 /// and by this share, which the noise itself is not known to.
 const NOISE_KNOWN_TO: f64 = 0.03;
-/// Of so many rows one is quieter than the row that shows the noise. The louder ones may have the target's motion.
+/// The noise is read from the row that is louder than one in this number of all rows: louder rows may show the motion.
 const QUIET: usize = 5;
 /// Normal deviate that one of [`QUIET`] is below.
 const QUIET_DEVIATE: f64 = -0.841_6;
-/// Second differences one after another have two thirds of their square in common, and a sixth with the ones after: as
-/// many have the spread of so many times fewer.
+/// Second differences one after another have two thirds of their square in common, and a sixth with the ones after: their
+/// mean spreads as if there were this many times fewer.
 const ALIKE: f64 = 1.0 + 2.0 * (16.0 / 36.0 + 1.0 / 36.0);
 /// A fit that leaves no more than this beyond noise needs no other guess of the motion, in variances of the noise.
 const SMALL: f64 = 0.1;
@@ -156,8 +156,8 @@ impl<'a> Frames<'a> {
         Ok(Followed { measurements, frames, velocity_px })
     }
 
-    /// The scene of the newest frame by all of these frames, for the motion that explains them best. `None` where it is too
-    /// fast for so many frames, or where there are too few of them.
+    /// The scene of the newest frame by all of these frames, for the motion that explains them best. `None` where the scene
+    /// moves by more than a side meanwhile, or where there are fewer than [`FEWEST`] frames.
     pub fn moved(&self, noise: f64, settings: &FollowSettings) -> Option<Sum> {
         let newest = self.0.last()?;
         if self.0.len() < FEWEST {
@@ -220,7 +220,7 @@ impl<'a> Frames<'a> {
         self.0.last().map_or(0.0, |frame| frame.at) - self.0.first().map_or(0.0, |frame| frame.at)
     }
 
-    /// Means of so many frames one after another, the newest ones.
+    /// Means of `together` frames one after another, the newest ones.
     fn groups(&self, together: usize) -> Vec<Group> {
         let middle = self.middle();
         let first = self.0.len() % together;
@@ -282,7 +282,7 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// Below this lies one of [`QUIET`] means of the squares of so many second differences of variance 1 (E. B. Wilson and M. M.
+/// Below this lies one of [`QUIET`] means of the squares of `triples` second differences of variance 1 (E. B. Wilson and M. M.
 /// Hilferty, *The distribution of chi-square*, 1931).
 fn of_quiet_rows(triples: usize) -> f64 {
     let ninth = 2.0 * ALIKE / (9.0 * triples as f64);

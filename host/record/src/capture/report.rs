@@ -94,7 +94,7 @@ impl<'r> CaptureReport<'r> {
             seconds,
             frames_per_s: counters.received as f64 / seconds,
             signal: captured.status.as_ref().and_then(Signal::of),
-            notes: captured.integrated.warnings(),
+            notes: captured.integrated.what_happened(),
             adc_latency_clocks: captured.setup.adc_latency,
             calibrated: captured.settling.is_some(),
             calibration: choice.used(captured).cloned(),

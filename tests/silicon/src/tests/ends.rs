@@ -114,6 +114,14 @@ fn a_supply_that_sags_while_lit_is_dark_at_once_and_stays_dark() {
     camera.assert_no_violation();
 }
 
+/// What the next host is told of the restart before.
+fn told_after(camera: &Camera) -> Vec<String> {
+    let mut tapped = Tapped::new(camera.link());
+    let mut session = Session::open(tapped.link()).unwrap();
+    session.status(&mut IgnorePackets).unwrap();
+    tapped.crashes()
+}
+
 /// The option byte as the board's page asks for it. The chip is in reset before the firmware sees anything.
 #[test]
 fn a_brown_out_while_lit_is_dark_at_once_and_the_next_host_is_told_of_it_once() {
@@ -132,17 +140,11 @@ fn a_brown_out_while_lit_is_dark_at_once_and_the_next_host_is_told_of_it_once() 
     drop(session);
     supply(3_300);
     camera.connect();
-    let hear = || {
-        let mut tapped = Tapped::new(camera.link());
-        let mut session = Session::open(tapped.link()).unwrap();
-        session.status(&mut IgnorePackets).unwrap();
-        assert!(!is_lit(&camera));
-        tapped.crashes()
-    };
-    let told = hear();
+    let told = told_after(&camera);
+    assert!(!is_lit(&camera));
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains("the supply fell below the brown-out level"), "{told:?}");
-    assert!(hear().is_empty());
+    assert!(told_after(&camera).is_empty());
     let mut session = Session::open(camera.link()).unwrap();
     assert!(measure(&mut session, &natural(), 2).counters.is_complete());
     // The configuration has acknowledged the FPGA's fault, whose watchdog ended the run.
@@ -211,10 +213,7 @@ fn a_firmware_that_stands_still_is_restarted_and_the_next_host_is_told_by_what()
     camera.with(Machine::stand_still);
     pass(&camera, 700.0);
     camera.connect();
-    let mut tapped = Tapped::new(camera.link());
-    let mut session = Session::open(tapped.link()).unwrap();
-    session.status(&mut IgnorePackets).unwrap();
-    let told = tapped.crashes();
+    let told = told_after(&camera);
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains("the watchdog restarted the chip"), "{told:?}");
     camera.assert_no_violation();
@@ -233,10 +232,7 @@ fn a_crystal_that_stops_while_lit_is_dark_at_once_and_the_next_host_is_told_of_i
     drop(session);
     pass(&camera, 5.0);
     camera.connect();
-    let mut tapped = Tapped::new(camera.link());
-    let mut session = Session::open(tapped.link()).unwrap();
-    session.status(&mut IgnorePackets).unwrap();
-    let told = tapped.crashes();
+    let told = told_after(&camera);
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains("the crystal stopped"), "{told:?}");
     println!("dark {dark_us:.1} us after the crystal stopped");

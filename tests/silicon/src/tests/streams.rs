@@ -50,7 +50,7 @@ fn it_passes_the_self_test_of_the_host() {
     camera.assert_no_violation();
 }
 
-/// A run as fast as the host port goes, for so many seconds of the chip's time; the rate of its frames.
+/// Frames a second of a run that is as fast as the host port, over some seconds of the chip's time.
 fn stream_for(seconds: u32) -> Option<f64> {
     let camera = connected_as(even())?;
     let mut session = Session::open(camera.link()).unwrap();
