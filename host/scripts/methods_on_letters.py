@@ -1,4 +1,4 @@
-"""Reconstruction methods on letters and a word of the virtual camera: the figures of docs/reconstruction.md about letters.
+"""Reconstruction methods on letters and a word of the virtual camera: the figures of docs/log/reconstruction.md about letters.
 
     python3 host/scripts/methods_on_letters.py target/release/nirspi
 

@@ -8,7 +8,7 @@ Starts `nirspi serve` with the virtual camera, and a token. One good page reads 
 whole time, asks for the state each second and is opened anew every ten seconds. The other clients come from 40 addresses of
 this machine, each does one of the things in KINDS at random, and again. Prints JSON: what became of the connections of each
 kind, images a second, the longest silence on the page, memory, open files; with --markdown the two tables of
-docs/reliability.md instead. Exits 1 if the page suffered, if a client without the token was answered, or if memory or files
+docs/log/reliability.md instead. Exits 1 if the page suffered, if a client without the token was answered, or if memory or files
 grew. Linux; needs Python alone.
 """
 
@@ -406,7 +406,7 @@ def unmet(report):
     return [words for is_so, words in checks if is_so]
 
 
-# The kinds in the order and words of docs/reliability.md.
+# The kinds in the order and words of docs/log/reliability.md.
 WORDS = {
     "silent": "says nothing", "half_a_request": "sends half a request",
     "a_byte_at_a_time": "sends a request a byte at a time", "half_a_body": "sends half a body",
@@ -422,7 +422,7 @@ def thousands(number):
 
 
 def markdown(report):
-    """The two tables of docs/reliability.md."""
+    """The two tables of docs/log/reliability.md."""
     rows = ["| a client that | connections | answered | closed by the program | left by the client |", "| -- | -- | -- | -- | -- |"]
     for kind, words in WORDS.items():
         ends = report["what_became_of_them"].get(kind, {})
@@ -463,7 +463,7 @@ def main():
     arguments.add_argument("--seconds", type=float, default=600)
     arguments.add_argument("--files", type=int, default=256, help="files that nirspi serve may open (ulimit -n)")
     arguments.add_argument("--plot", help="memory over time, SVG")
-    arguments.add_argument("--markdown", action="store_true", help="print the tables of docs/reliability.md instead of JSON")
+    arguments.add_argument("--markdown", action="store_true", help="print the tables of docs/log/reliability.md instead of JSON")
     arguments = arguments.parse_args()
     report = soak(arguments)
     report["unmet"] = unmet(report)

@@ -5,7 +5,7 @@
 
 Builds the search with counters on stable Rust, tries each law's seeds and the inputs in found/LAW that once broke it, then
 searches. A finding ends the run with one line: the law, the file, and how to try it again. Otherwise prints a table for
-docs/security.md. What reached new code is kept in target/fuzz/LAW for the next run.
+docs/log/security.md. What reached new code is kept in target/fuzz/LAW for the next run.
 """
 
 import concurrent.futures

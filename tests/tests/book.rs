@@ -1,11 +1,14 @@
-//! Tests that the pages under `docs/` make a book: every page is in the summary, every link leads to something, and the
-//! table of variables names every variable of the code.
+//! Tests that the pages under `docs/` make two books, the user's book and the engineering log: every page is in the summary
+//! of its book, every link leads to something, and the table of variables names every variable of the code.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi_tests::root;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+/// Folders of the user's book and of the engineering log.
+const BOOKS: [&str; 2] = ["docs", "docs/log"];
 
 fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -103,10 +106,11 @@ fn pages(folder: &Path) -> BTreeSet<String> {
 
 /// Every page that people read in the repository.
 fn all_pages() -> Vec<PathBuf> {
-    let docs = root().join("docs");
     let boards = root().join("boards");
     let mut all = vec![root().join("README.md"), boards.join("README.md")];
-    all.extend(pages(&docs).iter().map(|name| docs.join(name)));
+    for book in BOOKS {
+        all.extend(pages(&root().join(book)).iter().map(|name| root().join(book).join(name)));
+    }
     let folders = boards.read_dir().unwrap().map(|entry| entry.unwrap().path());
     all.extend(folders.map(|folder| folder.join("README.md")).filter(|page| page.is_file()));
     all
@@ -114,16 +118,18 @@ fn all_pages() -> Vec<PathBuf> {
 
 #[test]
 fn every_page_is_in_the_summary_once_and_every_entry_is_a_page() {
-    let docs = root().join("docs");
-    let entries = links(&read(&docs.join("SUMMARY.md")));
-    let listed: BTreeSet<String> = entries.iter().cloned().collect();
-    assert_eq!(entries.len(), listed.len(), "an entry twice in docs/SUMMARY.md: {entries:?}");
-    let mut there = pages(&docs);
-    assert!(there.remove("SUMMARY.md"));
-    let missing: Vec<_> = there.difference(&listed).collect();
-    assert!(missing.is_empty(), "add to docs/SUMMARY.md: {missing:?}");
-    let gone: Vec<_> = listed.difference(&there).collect();
-    assert!(gone.is_empty(), "docs/SUMMARY.md names pages that do not exist: {gone:?}");
+    for book in BOOKS {
+        let folder = root().join(book);
+        let entries = links(&read(&folder.join("SUMMARY.md")));
+        let listed: BTreeSet<String> = entries.iter().cloned().collect();
+        assert_eq!(entries.len(), listed.len(), "an entry twice in {book}/SUMMARY.md: {entries:?}");
+        let mut there = pages(&folder);
+        assert!(there.remove("SUMMARY.md"));
+        let missing: Vec<_> = there.difference(&listed).collect();
+        assert!(missing.is_empty(), "add to {book}/SUMMARY.md: {missing:?}");
+        let gone: Vec<_> = listed.difference(&there).collect();
+        assert!(gone.is_empty(), "{book}/SUMMARY.md names pages that do not exist: {gone:?}");
+    }
 }
 
 #[test]
@@ -199,7 +205,7 @@ fn a_broken_link_is_found_and_a_link_in_code_is_none() {
     for link in ["docs/none.md", "#none", "docs/glossary.md#none"] {
         assert!(leads_nowhere(&readme, link), "{link}");
     }
-    for link in ["docs/glossary.md", "#live", "docs/physics.md#8-photon-budget", "https://a.b/#c"] {
+    for link in ["docs/glossary.md", "#boards", "docs/log/physics.md#8-photon-budget", "https://a.b/#c"] {
         assert!(!leads_nowhere(&readme, link), "{link}");
     }
     let page = "[`a`](a.md) `[b](b.md)` ![c\nd](c.png)\n\n```text\n[e](e.md)\n# No heading\n```\n";

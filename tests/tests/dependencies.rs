@@ -1,4 +1,4 @@
-//! Tests that the table of docs/architecture.md agrees with `cargo metadata`, and that modules of a crate use each
+//! Tests that the table of docs/crates.md agrees with `cargo metadata`, and that modules of a crate use each
 //! other in one direction.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
@@ -21,7 +21,7 @@ struct Allowed {
 }
 
 fn table() -> BTreeMap<String, Allowed> {
-    let page = std::fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let page = std::fs::read_to_string(root().join("docs/crates.md")).unwrap();
     let names = |cell: &str| -> BTreeSet<String> {
         cell.split(',').map(|name| name.trim().to_owned()).filter(|name| !name.is_empty()).collect()
     };
@@ -83,7 +83,7 @@ fn crates_use_what_the_architecture_page_allows_and_nothing_else() {
     let packages = packages();
     assert_eq!(packages.len(), table.len(), "one row a crate");
     let found = violations(&packages, &table);
-    assert!(found.is_empty(), "docs/architecture.md does not allow: {found:#?}");
+    assert!(found.is_empty(), "docs/crates.md does not allow: {found:#?}");
 }
 
 #[test]

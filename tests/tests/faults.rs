@@ -3,7 +3,7 @@
 //! injector's own log, the LEDs must be off afterwards, and the capture after it must be whole. The column of
 //! the simulated USB core is kept: `boards/usb/src/tests/faults.rs` tries it.
 //!
-//! The table of `docs/reliability.md` is what the cells have found; `NIRSPI_BLESS=1` writes it.
+//! The table of `docs/log/reliability.md` is what the cells have found; `NIRSPI_BLESS=1` writes it.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
@@ -14,7 +14,7 @@ use nirspi_tests::pages::column;
 use nirspi_tests::root;
 use std::fmt::Write;
 
-const PAGE: &str = "docs/reliability.md";
+const PAGE: &str = "docs/log/reliability.md";
 const HEADING: &str = "## Each fault";
 
 const HEAD: &str = "# Reliability
@@ -29,22 +29,22 @@ test. Everything here is simulated:
 | over TCP | the same behind the program's server | a socket of the same machine | the same |
 | replay | a recording of the virtual camera | a file | the same |
 | emulated board | the firmware's machine code in QEMU, the golden model behind it | a serial line | the same, where QEMU is; elsewhere the test says `skipped: no qemu` and keeps the cells |
-| USB, simulated | the firmware's loop, the USB device and the chip's driver on a [simulated core](firmware.md#usb-simulated), a simple FPGA | a simulated bus with its host | `cargo test -p nirspi-usb` in `boards`, which writes this column |
+| USB, simulated | the firmware's loop, the USB device and the chip's driver on a [simulated core](../firmware.md#usb-simulated), a simple FPGA | a simulated bus with its host | `cargo test -p nirspi-usb` in `boards`, which writes this column |
 
 Each cell is one capture of 40 frames with the fault, and one of 10 frames after it, from a fixed
 seed. In every cell
 
 - nothing panics, and nothing waits for ever;
-- the four counters of [frames](recordings.md) are exactly those that follow from the injector's own
-  log: a damaged packet is one *corrupt* frame, a lost one is *lost*, one that comes after its
+- the four counters of [frames](../recordings.md) are exactly those that follow from the injector's
+  own log: a damaged packet is one *corrupt* frame, a lost one is *lost*, one that comes after its
   successor is *late*. On the simulated bus a simple host has exactly the frames that the camera
   made less those that the log says;
 - after the capture no LED shines, and the firmware does not run;
 - the capture after it, in a new session with the same camera, is whole.
 
-The cell says how the capture with the fault ended. [Safety](safety.md) says what switches the LEDs
-off, and [Firmware](firmware.md#every-state-of-a-session) what was checked in every state that the
-firmware can reach. No cable of a real camera was ever pulled.
+The cell says how the capture with the fault ended. [Safety](../safety.md) says what switches the
+LEDs off, and [Firmware](../firmware.md#every-state-of-a-session) what was checked in every state
+that the firmware can reach. No cable of a real camera was ever pulled.
 
 ## Ten million frames
 
@@ -75,8 +75,8 @@ grow. It prints the tables below, and without `--markdown` all that it saw as JS
 Seen on 22 November 2026 (simulated camera, release build, two cores that clients and builds used
 too, load 10), in 599 s: 620 668 connections, 1034 a second, a fifth of them to a WebSocket server
 that has gone since. A new connection takes the place of the
-[oldest one without an event stream](live-page.md#who-can-open-the-page), so most connections were
-closed before their answer.
+[oldest one without an event stream](../live-page-network.md#who-can-open-the-page), so most
+connections were closed before their answer.
 
 | a client that | connections | answered | closed by the program | left by the client |
 | -- | -- | -- | -- | -- |

@@ -1,5 +1,5 @@
 //! The learned prior beside the classical methods: the tables, curves and pictures of
-//! `docs/reconstruction.md`.
+//! `docs/log/reconstruction.md`.
 //!
 //! `cargo run --release -p nirspi-eval --example learned_prior -- DATA OUT TABLE...`
 //!

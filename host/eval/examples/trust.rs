@@ -1,4 +1,4 @@
-//! The calibration of intervals and readings, and the coverage curve of `docs/quality.md`.
+//! The calibration of intervals and readings, and the coverage curve of `docs/log/quality.md`.
 //!
 //! `cargo run --release -p nirspi-eval --example trust -- calibrate DATA FILE [WEIGHTS]` makes the
 //! calibration: FILE is `host/nets/weights/intervals.json` for the shipped weights. WEIGHTS is a

@@ -1,5 +1,5 @@
 //! The recursive estimate of moving scenes beside frame-by-frame methods at equal light: the table
-//! and the pictures of `docs/reconstruction.md`.
+//! and the pictures of `docs/log/reconstruction.md`.
 //!
 //! `cargo run --release -p nirspi-eval --example video -- OUT [FRAMES [NOISE]]`
 //!

@@ -1,5 +1,5 @@
 //! What the frames before add to a method, on every moving scene, for shares of the patterns and
-//! noises: the table of `docs/reconstruction.md`.
+//! noises: the table of `docs/log/reconstruction.md`.
 //!
 //! `cargo run --release -p nirspi-eval --example video_gain -- [METHOD [FRAMES]]`
 //!

@@ -12,7 +12,7 @@ use nirspi_nets::{Device, Networks, deblur};
 use serde::Serialize;
 
 /// Default steps of the ancestral sampler. The paper's 500 steps take fifty times as long, and
-/// quality falls with more than a few steps (`docs/quality.md`).
+/// quality falls with more than a few steps (`docs/log/quality.md`).
 pub const ANCESTRAL_STEPS: u32 = 10;
 
 /// Steps of the bridge in the tables.

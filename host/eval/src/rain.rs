@@ -139,7 +139,7 @@ const HALF_RIG_M: f64 = 0.25;
 
 /// How to interpret the extinction of a [`RainReport`].
 const NOTE: &str = "extinction counts light diffracted by under a milliradian, half of it, as lost; \
-                    a camera of this resolution does not lose it (docs/physics.md)";
+                    a camera of this resolution does not lose it (docs/rain.md)";
 
 /// The effects of `drops` on light of these wavelengths over `distance_m` and back. `radar` adds
 /// their differential reflectivity, which fog drops do not have.

@@ -1,4 +1,4 @@
-//! The embedded weights (`host/nets/weights`, made as `docs/training.md` describes).
+//! The embedded weights (`host/nets/weights`, made as `docs/log/training.md` describes).
 
 use crate::weights::{CHECKSUM, VERSION, Weights, WeightsError, header};
 use serde::Serialize;

@@ -4,7 +4,7 @@
 //! The readings get fresh noise of the size estimated in them (a parametric bootstrap), and all
 //! stages run again. The spread says how well a result repeats. It is no error bar: what the
 //! network gets wrong in every copy (bias, or a stroke that it invents each time) is not in it.
-//! `docs/quality.md` says how often the truth lies within it.
+//! `docs/log/quality.md` says how often the truth lies within it.
 
 use crate::estimate::Estimate;
 use crate::random::Noise;

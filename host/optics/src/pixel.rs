@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn the_budget_of_a_pixel_agrees_with_one_worked_by_hand() {
-        // docs/physics.md has the same example: white target, 0.3 m, 25 us, dry, 15 klx.
+        // docs/log/physics.md has the same example: white target, 0.3 m, 25 us, dry, 15 klx.
         let pixel = at(300.0, 25.0);
         let close = |name: &str, found: f64, expected: f64| {
             assert!((found / expected - 1.0).abs() < 1e-3, "{name}: {found} against {expected}");

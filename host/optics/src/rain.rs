@@ -20,7 +20,7 @@
 //! | [`radar`] | drops | differential reflectivity, an input of the paper's Algorithm 2 |
 //!
 //! Every effect is a sum over the same list of drops ([`Drops`]), so two results differ by physics
-//! and not by their assumptions about the rain. `docs/physics.md` in the repository derives and
+//! and not by their assumptions about the rain. `docs/log/physics.md` in the repository derives and
 //! cites each formula.
 
 pub mod air;

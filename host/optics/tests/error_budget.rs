@@ -1,4 +1,4 @@
-//! The table of docs/physics.md that says how much the picture of the paper's camera rests on each assumed constant.
+//! The table of docs/log/physics.md that says how much the picture of the paper's camera rests on each assumed constant.
 //! `NIRSPI_BLESS=1` writes it anew.
 
 #![expect(clippy::unwrap_used, reason = "a failed unwrap in a helper fails its test")]
@@ -86,7 +86,7 @@ fn table() -> String {
 
 #[test]
 fn the_page_says_what_each_assumption_weighs() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/physics.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/log/physics.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = page.split_once(BEGIN).unwrap();
     let (found, after) = rest.split_once(END).unwrap();

@@ -13,7 +13,7 @@
 //! ([`settings::Change`]). Two threads compute; all of HTTP runs asynchronously on a third thread.
 //! Without threads and server, the same parts take turns ([`Turns`]).
 //!
-//! `docs/live-page.md` lists what each stage holds at most, and where a test says so. Each frame's
+//! `docs/log/live-page.md` lists what each stage holds at most, and where a test says so. Each frame's
 //! delay to each stage is measured (`delays.rs`). If the computer is too slow for the camera, the page
 //! gives up images, then enhancement (`overload.rs`).
 

@@ -4,7 +4,7 @@
 //!
 //! `cargo run --release -p nirspi-virtual --example orders_of_pairs [CAMERA [CROSSTALK_FF]]`. No gateware: the lines are set
 //! by this program, because the gateware knows one of these orders alone. The receiver is without noise but for a dither of one
-//! count. Readings of all slots are undone by the mean of rise and fall. docs/physics.md has the result.
+//! count. Readings of all slots are undone by the mean of rise and fall. docs/log/physics.md has the result.
 
 use nirspi::response::Settling;
 use nirspi::scene::SceneSource;

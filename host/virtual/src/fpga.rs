@@ -301,7 +301,7 @@ impl SimulatedFpga for OpticalFpga {
         if !self.detector.gateware.has_adc_clock() {
             self.clock = end;
         }
-        // A camera without these needs none of their checks in each clock: docs/performance.md has its speed.
+        // A camera without these needs none of their checks in each clock: docs/log/performance.md has its speed.
         let plain = self.wiring.is_none() && self.loopback.is_none();
         while self.clock < end {
             let stretch = self.look_in_front().min(end - self.clock);

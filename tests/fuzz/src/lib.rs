@@ -3,7 +3,7 @@
 //! A law is a function of any bytes that panics where a reader breaks its promise. The search
 //! (`main.rs`, `search.py`) is libFuzzer, which keeps bytes that reach new code and changes them
 //! further. It begins with the seeds of each law: small sound files that the program's own writers
-//! make. `bash .ci/run fuzz` runs it; `docs/security.md` has the table of laws.
+//! make. `bash .ci/run fuzz` runs it; `docs/log/security.md` has the table of laws.
 //!
 //! * [`LAWS`] is the list of all laws,
 //! * [`memory`] counts what a reader takes, [`place`] gives readers of files a path,

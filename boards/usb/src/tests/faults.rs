@@ -1,4 +1,4 @@
-//! The column "USB, simulated" of the fault matrix in `docs/reliability.md`: each fault of the way from camera to host,
+//! The column "USB, simulated" of the fault matrix in `docs/log/reliability.md`: each fault of the way from camera to host,
 //! tried on the firmware's loop, this device and the chip's driver on the simulated core.
 //!
 //! Each cell is a run with the fault, and a run of ten frames after it. The host must have what the camera has made, less
@@ -395,7 +395,7 @@ fn with_each_chip(tried: fn(Chip) -> String) -> String {
 
 #[test]
 fn every_fault_is_counted_and_survived() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reliability.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/log/reliability.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (text, table) = page.split_once(HEADING).expect("the table");
     let mut cells: BTreeMap<&str, String> =
@@ -426,6 +426,6 @@ fn every_fault_is_counted_and_survived() {
     let found = std::fs::read_to_string(&path).unwrap();
     assert!(
         found == expected,
-        "the column {TITLE:?} of docs/reliability.md is stale: NIRSPI_BLESS=1\n{expected}"
+        "the column {TITLE:?} of docs/log/reliability.md is stale: NIRSPI_BLESS=1\n{expected}"
     );
 }

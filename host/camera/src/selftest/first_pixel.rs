@@ -21,7 +21,7 @@ const BLANKED: u16 = 2;
 const SWEEPS: u32 = 256;
 const FRAMES: u32 = 2;
 /// The largest difference from the neighbours, as a share of white. LEDs of one array differ less, and the edges
-/// of a circuit's LEDs alone make 3.7 of it (`docs/physics.md`).
+/// of a circuit's LEDs alone make 3.7 of it (`docs/log/physics.md`).
 const MOST: f64 = 0.5;
 /// The limit allows noise of this many standard deviations.
 const SIGMAS: f64 = 5.0;

@@ -4,7 +4,7 @@
     python3 faults.py target/release/nirspi [WORD...]
 
 Each fault is tried against the part of the check that looks at its place; words choose faults whose description has one of
-them. Prints a line for each fault, and exits 1 if one is missed. docs/mutants.md has the results.
+them. Prints a line for each fault, and exits 1 if one is missed. docs/log/mutants.md has the results.
 """
 
 import pathlib

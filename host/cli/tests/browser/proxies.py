@@ -1,4 +1,4 @@
-"""The page below a sub-path behind nginx and Caddy, with the very configurations of docs/live-page.md: the page's addresses, its
+"""The page below a sub-path behind nginx and Caddy, with the very configurations of docs/live-page-network.md: the page's addresses, its
 cookie, its token, and a stop that gets through."""
 
 import contextlib
@@ -15,7 +15,7 @@ import urllib.request
 from pictures import seen
 from playwright.sync_api import expect
 
-PAGE = pathlib.Path(__file__).parents[4] / "docs/live-page.md"
+PAGE = pathlib.Path(__file__).parents[4] / "docs/live-page-network.md"
 # The name in the page's examples. The browser finds it on this machine.
 NAME = "camera.example.org"
 BROWSER = [f"--host-resolver-rules=MAP {NAME} 127.0.0.1"]
