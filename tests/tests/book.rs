@@ -205,7 +205,9 @@ fn a_broken_link_is_found_and_a_link_in_code_is_none() {
     for link in ["docs/none.md", "#none", "docs/glossary.md#none"] {
         assert!(leads_nowhere(&readme, link), "{link}");
     }
-    for link in ["docs/glossary.md", "#boards", "docs/log/physics.md#8-photon-budget", "https://a.b/#c"] {
+    for link in
+        ["docs/glossary.md", "#boards", "docs/log/physics.md#8-photon-budget", "https://a.b/#c"]
+    {
         assert!(!leads_nowhere(&readme, link), "{link}");
     }
     let page = "[`a`](a.md) `[b](b.md)` ![c\nd](c.png)\n\n```text\n[e](e.md)\n# No heading\n```\n";
