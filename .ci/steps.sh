@@ -62,7 +62,7 @@ by_name=(
     "publish         each library crate builds from its package alone; crates.io"
     "licence-texts   the licences of all dependencies in one page; crates.io"
     "deb             the Debian package; crates.io"
-    "release-folder  the folder that nirspi update takes; firmware, seeds"
+    "release-folder  the folder that nirspi camera update takes; firmware, seeds"
     "cluster         files and seeds on a Ray cluster of two nodes; PyPI, 700 MB"
     "python-peers    training in Python, and the package beside SPyRiT, deepinv, scikit-learn, SPAMS; PyPI, 6 GB for torch"
 )
@@ -208,13 +208,13 @@ step_deb() {
     [ -f target/licences.html ] || step_licence_texts
     cargo build --locked --release --features flash,wgpu
     local nirspi=target/release/nirspi shell
-    "$nirspi" man target/package/man
-    for shell in bash zsh fish; do "$nirspi" completions "$shell" >"target/package/nirspi.$shell"; done
+    "$nirspi" dev man target/package/man
+    for shell in bash zsh fish; do "$nirspi" dev completions "$shell" >"target/package/nirspi.$shell"; done
     cargo deb --locked --no-build -p nirspi-cli --output target/package/
     ls -l target/package
 }
 
-# The folder that `nirspi update` takes, from firmware and bitstream as they were built here.
+# The folder that `nirspi camera update` takes, from firmware and bitstream as they were built here.
 step_release_folder() {
     step_firmware
     # The ELF that is released is the one that has run.
@@ -437,7 +437,7 @@ step_web() {
 step_tcp() {
     cargo build --locked --release
     local nirspi=target/release/nirspi server address
-    "$nirspi" virtual --listen 127.0.0.1:0 --precompute 8 --once >"$out/server.log" &
+    "$nirspi" dev virtual --listen 127.0.0.1:0 --precompute 8 --once >"$out/server.log" &
     server=$!
     for _ in $(seq 100); do grep -q 'tcp:' "$out/server.log" && break; sleep 0.1; done
     address=$(sed -n 's/.*tcp:\([0-9.:]*\):.*/\1/p' "$out/server.log")

@@ -56,7 +56,7 @@ served=''
 end() { [ -z "$served" ] || kill "$served" 2>/dev/null; }
 trap end EXIT
 if [ -z "$camera" ]; then
-    "$nirspi" virtual --listen 127.0.0.1:0 --scene white >"$out/virtual.log" 2>&1 &
+    "$nirspi" dev virtual --listen 127.0.0.1:0 --scene white >"$out/virtual.log" 2>&1 &
     served=$!
     for _ in $(seq 100); do
         address=$(grep -o '127\.0\.0\.1:[0-9]*' "$out/virtual.log" | head -1)
@@ -69,7 +69,7 @@ fi
 
 step_info() {
     local title='identity and versions'
-    ask info info || { report "$title" FAIL "$(said info)"; return; }
+    ask info camera info || { report "$title" FAIL "$(said info)"; return; }
     local advice answers
     advice=$(field "$out/info.json" '"; ".join(part["advice"] for part in report["parts"] if part["advice"])')
     answers=$(field "$out/info.json" 'report["fpga_answers"]')
@@ -81,7 +81,7 @@ step_info() {
 }
 
 step_selftest() {
-    ask selftest selftest --calibration "$calibration"
+    ask selftest camera selftest --calibration "$calibration"
     local code=$? failed
     failed=$(field "$out/selftest.json" '", ".join(check["name"] for check in report["checks"] if check["verdict"] == "failed")')
     if [ $code = 0 ]; then report 'self-test, from registers to light' ok "$(field "$out/selftest.json" '"{} checks".format(len(report["checks"]))')"
@@ -90,7 +90,7 @@ step_selftest() {
 
 step_gateware() {
     [ -n "$gateware" ] || { report 'gateware loaded over the link' skipped 'no --gateware FILE'; return; }
-    if "$nirspi" gateware "$gateware" --camera "$camera" >"$out/gateware.log" 2>&1; then report 'gateware loaded over the link' ok "$gateware"
+    if "$nirspi" camera gateware "$gateware" --camera "$camera" >"$out/gateware.log" 2>&1; then report 'gateware loaded over the link' ok "$gateware"
     else report 'gateware loaded over the link' FAIL "$(said gateware)"; fi
 }
 

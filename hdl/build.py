@@ -8,7 +8,7 @@
 Synthesises `hdl/sv` with the board's top (yosys), places and routes it once a seed (nextpnr), packs the seed
 with the best margin (ecppack). Exits 1 when a seed misses a clock's frequency and margin, when a path from clock to clock
 is too long, when the bitstream is longer than a microcontroller's board takes, or when the page of figures
-(docs/gateware.md) is not of this build; NIRSPI_BLESS=1 writes the page's.
+(docs/log/gateware.md) is not of this build; NIRSPI_BLESS=1 writes the page's.
 Needs Python 3.9 or later and, the first time, PyPI. The bitstream is never committed.
 """
 
@@ -29,7 +29,7 @@ from tools import HDL, ROOT, TARGET, tool
 TIMING_WEIGHT = 300
 
 # Where seed 1 of each board has its figures.
-PAGE = ROOT / "docs" / "gateware.md"
+PAGE = ROOT / "docs" / "log" / "gateware.md"
 
 
 @dataclass(frozen=True)

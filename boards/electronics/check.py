@@ -205,7 +205,7 @@ def rows(found: dict, chain: Chain, paper: dict, fga015: dict, own: dict) -> lis
         Row("row line at the last gate, without buffers", "ns", found["row.direct_rise_s"] * 1e9, edge_ns / 3,
             "a third of the LEDs' edge", "gap", 0.1, 7.9),
         Row("row line, first to last tile", "ns", abs(found["row.skew_s"]) * 1e9, 1.0,
-            "1 ns, docs/gateware.md", "most"),
+            "1 ns, docs/log/gateware.md", "most"),
         Row("photodiode", "pF", deck_value(HERE / "receiver.lib", "cdiode") * 1e12,
             fga015["detector"]["capacitance_pf"], "fga015 detector.capacitance_pf", "near", 0.001),
         Row("feedback", "kohm", deck_value(HERE / "receiver.lib", "rf") / 1e3,

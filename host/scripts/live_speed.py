@@ -3,7 +3,7 @@
 
     python3 live_speed.py target/release/nirspi [--seconds 60] [--enhance] [--plot memory.svg]
 
-Starts `nirspi virtual --precompute 64 --real-time --drop-when-full` and `nirspi serve` as two processes, records, and reads
+Starts `nirspi dev virtual --precompute 64 --real-time --drop-when-full` and `nirspi serve` as two processes, records, and reads
 the page's events as a browser does. Prints JSON: frames a second and frames that did not arrive, processor time and memory
 of `nirspi serve`, delays as the server measures them (p50 and p99 of 10 s, the worst of the run), and the delay until this
 script has an image (same clock). Exits 1 if the speed line is not met. Linux; needs Python alone.
@@ -112,7 +112,7 @@ def watch(address, server, seconds):
 
 
 def measure(arguments, folder):
-    camera, line = started([arguments.nirspi, "virtual", "--listen", "127.0.0.1:0", "--precompute", "64", "--real-time",
+    camera, line = started([arguments.nirspi, "dev", "virtual", "--listen", "127.0.0.1:0", "--precompute", "64", "--real-time",
                             "--drop-when-full", "--once"], "tcp:")
     server, address = started([arguments.nirspi, "serve", "--listen", "127.0.0.1:0", "--camera", line.rstrip(":"),
                                "--sampling", "1", "--sweeps", str(arguments.sweeps), "--method", arguments.method,

@@ -213,7 +213,7 @@ pub enum SourceError {
     #[error("{}: complex readings, expected real ones here: choose a part with --part real or --part imaginary", .0.display())]
     Complex(PathBuf),
     /// All measurements of a file are too many for the memory.
-    #[error("{}: {count} measurements, expected at most {most} of this size at a time: choose one with --index N, or export a recording with nirspi export", .path.display())]
+    #[error("{}: {count} measurements, expected at most {most} of this size at a time: choose one with --index N, or export a recording with nirspi recording export", .path.display())]
     TooMany {
         /// The file.
         path: PathBuf,

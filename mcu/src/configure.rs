@@ -14,7 +14,7 @@ use nirspi_wire::{
 };
 
 /// Frames that come slower than this leave by the host port also where there is a parallel port: the slowest packet
-/// takes 206 us by the host port (`docs/firmware.md`, Throughput), and only there can the signal meter ask for the
+/// takes 206 us by the host port (`docs/log/firmware.md`, Throughput), and only there can the signal meter ask for the
 /// level of the very frame that it looks at.
 const FAST_FRAME: Micros = Micros(220);
 

@@ -32,7 +32,7 @@ const _: () = assert!(BYTES_PER_MICRO * 3_000_000 >= ADC_HZ);
 const IN_FLIGHT: u32 = 64;
 
 /// Bytes that stay free beyond a grant: those in flight; four that the FPGA may send after the line has fallen
-/// (`docs/gateware.md`, Parallel port); those of the two microseconds to which a timer is exact; and as many again.
+/// (`docs/log/gateware.md`, Parallel port); those of the two microseconds to which a timer is exact; and as many again.
 const MARGIN: u32 = 256;
 
 const _: () = assert!(MARGIN >= IN_FLIGHT + 4 + 2 * BYTES_PER_MICRO);

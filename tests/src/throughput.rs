@@ -34,7 +34,7 @@ pub const RING_WORDS: usize = 32 * 1024;
 /// Packets that can wait for the host, as on the reference board.
 const PLACES: usize = 32;
 
-/// What a USB 2.0 host takes in a microsecond, as measured by others (`docs/gateware.md`, Parallel port). No board of
+/// What a USB 2.0 host takes in a microsecond, as measured by others (`docs/log/gateware.md`, Parallel port). No board of
 /// ours has measured it.
 const USB_BYTES_PER_MICRO: u64 = 33;
 
@@ -86,7 +86,7 @@ fn instructions_ps(instructions: f64) -> u64 {
 
 /// A row of the page's table of instructions.
 fn instructions_of(part: &str) -> f64 {
-    let rows = table(&page("docs/firmware.md"), "### Instructions");
+    let rows = table(&page("docs/log/firmware.md"), "### Instructions");
     let row = rows.iter().find(|row| row[0] == part).expect("a row");
     row[1].replace(' ', "").parse().expect("a number")
 }
@@ -102,7 +102,7 @@ pub fn meter_share() -> f64 {
 }
 
 impl Processor {
-    /// The reference board, of 160 MHz: the instructions that `docs/firmware.md` has from emulation, at 1.3 clocks
+    /// The reference board, of 160 MHz: the instructions that `docs/log/firmware.md` has from emulation, at 1.3 clocks
     /// each.
     ///
     /// # Panics

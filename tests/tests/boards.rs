@@ -401,7 +401,7 @@ fn tables_of_the_pages_show_what_board_toml_says() {
         format!("| `{name}` | {flash} | {statics} | {stack} |")
     });
     let header = "| board | flash, bytes | static memory, bytes | stack, bytes |";
-    check_rows("docs/firmware.md", header, |line| line.starts_with('|'), &budgets);
+    check_rows("docs/log/firmware.md", header, |line| line.starts_with('|'), &budgets);
 }
 
 /// The firmware does not depend on the optics' simulator, so each has the number of zones.

@@ -191,7 +191,7 @@ fn the_table_of_variables_names_every_variable_of_the_code_that_is_no_option() {
     let page = read(&root().join("docs/contributing.md"));
     let rows = page.lines().filter(|line| line.starts_with("| `NIRSPI_"));
     let listed = variables(&rows.filter_map(|row| row.split(" | ").next()).collect::<String>());
-    // `NIRSPI_DATA` is both: the tests' folder, and the option `--data` of `nirspi pairs`.
+    // `NIRSPI_DATA` is both: the tests' folder, and the option `--data` of `nirspi dev pairs`.
     found.retain(|name| listed.contains(name) || !options.contains(option(name).as_str()));
     assert_eq!(
         found, listed,

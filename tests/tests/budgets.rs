@@ -1,5 +1,5 @@
 //! Tests that every board's firmware fits the budget of its `board.toml`, has no heap, and can
-//! panic only where docs/firmware.md lists a place.
+//! panic only where docs/log/firmware.md lists a place.
 //!
 //! A board that is not built is skipped with a message: `bash boards/build.sh` builds every board.
 
@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::PathBuf;
 
-const PAGE: &str = "docs/firmware.md";
+const PAGE: &str = "docs/log/firmware.md";
 
 /// Prints past the test harness's capture, so that the table and a skipped board are visible.
 fn say(line: &str) {
@@ -190,5 +190,5 @@ fn the_application_can_panic_only_where_the_page_says_and_why_it_does_not() {
     for (caller, panic) in &found {
         say(&format!("{caller}: {panic}"));
     }
-    assert!(unlisted.is_empty(), "not in docs/firmware.md: {unlisted:#?}");
+    assert!(unlisted.is_empty(), "not in docs/log/firmware.md: {unlisted:#?}");
 }

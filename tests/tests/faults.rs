@@ -29,7 +29,7 @@ test. Everything here is simulated:
 | over TCP | the same behind the program's server | a socket of the same machine | the same |
 | replay | a recording of the virtual camera | a file | the same |
 | emulated board | the firmware's machine code in QEMU, the golden model behind it | a serial line | the same, where QEMU is; elsewhere the test says `skipped: no qemu` and keeps the cells |
-| USB, simulated | the firmware's loop, the USB device and the chip's driver on a [simulated core](../firmware.md#usb-simulated), a simple FPGA | a simulated bus with its host | `cargo test -p nirspi-usb` in `boards`, which writes this column |
+| USB, simulated | the firmware's loop, the USB device and the chip's driver on a [simulated core](firmware.md#usb-simulated), a simple FPGA | a simulated bus with its host | `cargo test -p nirspi-usb` in `boards`, which writes this column |
 
 Each cell is one capture of 40 frames with the fault, and one of 10 frames after it, from a fixed
 seed. In every cell
@@ -43,8 +43,8 @@ seed. In every cell
 - the capture after it, in a new session with the same camera, is whole.
 
 The cell says how the capture with the fault ended. [Safety](../safety.md) says what switches the
-LEDs off, and [Firmware](../firmware.md#every-state-of-a-session) what was checked in every state
-that the firmware can reach. No cable of a real camera was ever pulled.
+LEDs off, and [Firmware](firmware.md#every-state-of-a-session) what was checked in every state that
+the firmware can reach. No cable of a real camera was ever pulled.
 
 ## Ten million frames
 

@@ -1,4 +1,4 @@
-//! Tests that the tables of `docs/safety.md` are what `nirspi safety` prints, and that every test and proof that the safety
+//! Tests that the tables of `docs/log/safety.md` are what `nirspi camera safety` prints, and that every test and proof that the safety
 //! case names exists.
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
@@ -8,7 +8,7 @@ use nirspi_optics::CameraModel;
 use nirspi_tests::root;
 use std::path::Path;
 
-const PAGE: &str = "docs/safety.md";
+const PAGE: &str = "docs/log/safety.md";
 
 /// The page with this block written anew, between its two comments.
 fn with_block(page: &str, name: &str, table: &str) -> String {

@@ -90,10 +90,10 @@ fn measured(patterns: u16) -> Stretch {
     seen
 }
 
-/// The table of `docs/firmware.md`.
+/// The table of `docs/log/firmware.md`.
 #[test]
 fn the_page_has_the_frames_a_second_that_firmware_and_gateware_give() {
-    let rows = table(&page("docs/firmware.md"), "## Throughput");
+    let rows = table(&page("docs/log/firmware.md"), "## Throughput");
     let mut compared = 0;
     for row in rows {
         let patterns: String = row[0].chars().take_while(char::is_ascii_digit).collect();
@@ -137,7 +137,7 @@ fn no_transfer_waits_for_the_end_of_a_sweep() {
 /// Clocks of the ADC for a byte by the parallel port.
 const BYTE: u64 = 3;
 /// Clocks between two packets, while the FPGA makes the beginning of the next one: with these the RTL's own figure
-/// comes out, 9927 frames/s of 32-bit samples to a receiver that is always ready (`docs/gateware.md`, Parallel port).
+/// comes out, 9927 frames/s of 32-bit samples to a receiver that is always ready (`docs/log/gateware.md`, Parallel port).
 const LEAD: u64 = 184;
 
 /// The golden model at the end of the same wires and of its parallel port, whose bytes a DMA channel writes into a
@@ -270,9 +270,9 @@ fn streamed(processor: Processor) -> Stretch {
     seen
 }
 
-/// A row of `docs/firmware.md` for the parallel port.
+/// A row of `docs/log/firmware.md` for the parallel port.
 fn row(begins: &str) -> Vec<String> {
-    let rows = table(&page("docs/firmware.md"), "## Packets by the parallel port");
+    let rows = table(&page("docs/log/firmware.md"), "## Packets by the parallel port");
     rows.into_iter().find(|cells| cells[0].starts_with(begins)).expect("the page has this row")
 }
 
@@ -301,7 +301,7 @@ fn packets_of_the_parallel_port_reach_10_500_frames_a_second() {
 /// Why replies and packets share one endpoint.
 #[test]
 fn a_reply_waits_behind_packets_for_no_longer_than_the_page_says() {
-    let text = page("docs/firmware.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    let text = page("docs/log/firmware.md").split_whitespace().collect::<Vec<_>>().join(" ");
     let (_, told) = text.split_once("A reply waits behind them for at most ").expect("a figure");
     let told: f64 = told.split(' ').next().and_then(|told| told.parse().ok()).expect("a number");
     let seen = streamed(Processor::streaming()).reply_ms;

@@ -53,7 +53,7 @@ fn access(opcode: u8, address: u16, dummy: DummyCycles) -> TransferConfig {
 }
 
 /// Changes `sck` between two accesses. Lines that the FPGA changes with an edge of the faster clock are
-/// sampled one and a half periods after that edge (docs/gateware.md, Packets clocked by sck). The
+/// sampled one and a half periods after that edge (docs/log/gateware.md, Packets clocked by sck). The
 /// peripheral takes a new prescaler only when it is not busy, and is busy for a moment afterwards, for
 /// which the next access waits.
 fn set_prescaler(prescaler: u8) {

@@ -5,7 +5,7 @@ use nirspi_wire::host_port::{
 };
 
 /// Slowest clock of the FPGA's host port: the FPGA's own oscillator, 15 % below nominal
-/// (docs/gateware.md, Clocks and resets).
+/// (docs/log/gateware.md, Clocks and resets).
 const HOST_CLOCK_MIN_HZ: u32 = 87_800_000;
 
 /// Fastest `sck` of accesses that the FPGA samples, in Hz.

@@ -1,6 +1,6 @@
 /// The camera on the Lattice ECP5 Evaluation Board, LFE5UM5G-85F-EVN: its clocks and its pins.
 ///
-/// Pins and levels are in `board.lpf` and `docs/gateware.md`; `shell.sv` has what does not touch a pin.
+/// Pins and levels are in `board.lpf` and `docs/log/gateware.md`; `shell.sv` has what does not touch a pin.
 module top (
     // AD9246-125 or the like: 14 bit, offset binary, CMOS, with a data clock.
     input  logic        adc_dco,

@@ -15,7 +15,7 @@ use thiserror::Error;
 /// The longest time of light: one hour.
 const MOST_MS: f64 = 3.6e6;
 /// The shortest time of a frame that the boards' port carries, in microseconds. The slowest packet,
-/// of 1024 patterns, takes 206 us (`docs/firmware.md`, Throughput).
+/// of 1024 patterns, takes 206 us (`docs/log/firmware.md`, Throughput).
 const SHORTEST_FRAME_US: u64 = 220;
 
 /// A time of light: how long the patterns of a measurement are shown in all.

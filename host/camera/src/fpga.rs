@@ -65,8 +65,8 @@ pub enum FpgaProblem {
     },
     /// Gateware of another version.
     #[error(
-        "the FPGA runs gateware {}, and this program knows {}: load the gateware of this version (nirspi gateware \
-         FILE, or nirspi update)",
+        "the FPGA runs gateware {}, and this program knows {}: load the gateware of this version (nirspi camera gateware \
+         FILE, or nirspi camera update)",
         Version::of_register(*.found),
         Version::of_register(Register::Version.reset())
     )]

@@ -82,14 +82,14 @@ pub fn compare(camera: &CameraIdentity, map: Option<u32>) -> Vec<Part> {
     parts
 }
 
-const LOAD_GATEWARE: &str = "load this version's bitstream: nirspi gateware target/gateware/ecp5-evn/nirspi.bit --camera ... \
+const LOAD_GATEWARE: &str = "load this version's bitstream: nirspi camera gateware target/gateware/ecp5-evn/nirspi.bit --camera ... \
      (python3 hdl/build.py makes it)";
 
 /// How to update a board's firmware to this program's version.
 fn update_firmware(board: &str) -> String {
     match Board::named(board) {
         Some(Board { name, chip: Some(_), .. }) => {
-            format!("flash the firmware: nirspi flash --board {name}")
+            format!("flash the firmware: nirspi camera flash --board {name}")
         }
         _ => format!("build the firmware of {board} again, with this program's version"),
     }
@@ -121,7 +121,7 @@ mod tests {
         let old = camera(|camera| camera.firmware = "0.0.9".into());
         let found = advice(&old, Register::Version.reset());
         assert_eq!(found.len(), 1);
-        assert!(found[0].1.contains("nirspi flash --board nucleo-u5a5zj-q"), "{found:?}");
+        assert!(found[0].1.contains("nirspi camera flash --board nucleo-u5a5zj-q"), "{found:?}");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! `nirspi bench`: speed on this machine, as JSON.
+//! `nirspi dev bench`: speed on this machine, as JSON.
 
 mod enhance;
 mod omp;
@@ -13,10 +13,10 @@ use std::process::ExitCode;
 /// Measure speed on this machine, as JSON
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi bench omp --frames 256\n\
-    \x20 nirspi bench omp --input problem.npz --out solution.npz\n\
-    \x20 nirspi bench enhance --frames 256\n\
-    \x20 nirspi bench pipeline --frames 4096 --backend cuda")]
+    \x20 nirspi dev bench omp --frames 256\n\
+    \x20 nirspi dev bench omp --input problem.npz --out solution.npz\n\
+    \x20 nirspi dev bench enhance --frames 256\n\
+    \x20 nirspi dev bench pipeline --frames 4096 --backend cuda")]
 pub struct Args {
     #[command(subcommand)]
     what: What,

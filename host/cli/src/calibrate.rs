@@ -1,4 +1,4 @@
-//! `nirspi calibrate`: measures ADC latency, settling and flat field against a white sheet and
+//! `nirspi camera calibrate`: measures ADC latency, settling and flat field against a white sheet and
 //! keeps them for the camera.
 
 use super::camera::{CameraArgs, ModelArgs, SceneArgs, exposure};
@@ -23,7 +23,7 @@ use std::time::SystemTime;
 /// Measure a camera's ADC latency, settling and flat field, and keep them for the captures after it
 ///
 /// Hold a white sheet before the camera, at the shortest distance at which the image is in focus. Latency and settling belong to the camera and
-/// its gateware, so one calibration is enough until the gateware or the amplifier changes. `nirspi selftest` measures the
+/// its gateware, so one calibration is enough until the gateware or the amplifier changes. `nirspi camera selftest` measures the
 /// same and checks the rest of the camera, too. A virtual camera is shown a white sheet automatically.
 ///
 /// With --white, the sheet must fill the field and be evenly lit. The command then also measures the light of each LED and
@@ -31,9 +31,9 @@ use std::time::SystemTime;
 /// lens: the command measures what each pixel reads without light and adds that to the flat field.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi calibrate --camera usb\n\
-    \x20 nirspi calibrate --camera usb --white\n\
-    \x20 nirspi calibrate --camera tcp:127.0.0.1:1550 --calibration bench-2.json")]
+    \x20 nirspi camera calibrate --camera usb\n\
+    \x20 nirspi camera calibrate --camera usb --white\n\
+    \x20 nirspi camera calibrate --camera tcp:127.0.0.1:1550 --calibration bench-2.json")]
 pub struct Args {
     #[command(flatten)]
     camera: CameraArgs,
@@ -185,7 +185,9 @@ fn run_dark(args: &Args, setup: MeasurementSetup, sweeps: u32) -> Result<ExitCod
     let camera = session.identity().clone();
     let kept = KeptFlatField::of(&camera)?.ok_or_else(|| {
         let serial = &camera.serial;
-        anyhow!("no flat field is kept for camera {serial}: run nirspi calibrate --white first")
+        anyhow!(
+            "no flat field is kept for camera {serial}: run nirspi camera calibrate --white first"
+        )
     })?;
     let settling = KeptCalibration::read(&path_of(&camera.serial)?, &camera)?.settling;
     let setup = MeasurementSetup { adc_latency: settling.adc_latency, ..setup };

@@ -15,7 +15,7 @@ pub struct CalibrationArgs {
     /// kept calibration is used
     #[arg(long)]
     calibrate: bool,
-    /// Use this calibration, written by `nirspi calibrate` or `nirspi selftest`, instead of the one kept for the camera
+    /// Use this calibration, written by `nirspi camera calibrate` or `nirspi camera selftest`, instead of the one kept for the camera
     #[arg(long, value_name = "FILE", conflicts_with = "calibrate")]
     calibration: Option<PathBuf>,
     /// Use no calibration and measure none. This needs --adc-latency, and leaves the leak from pattern to pattern in the
@@ -25,7 +25,7 @@ pub struct CalibrationArgs {
     /// ADC clocks from light to sample, if you know their number. A wrong number makes a wrong or inverted picture
     #[arg(long, value_name = "N", requires = "no_calibration")]
     adc_latency: Option<u8>,
-    /// Do not correct images for unequal LEDs, even if `nirspi calibrate --white` has kept a flat field for the camera
+    /// Do not correct images for unequal LEDs, even if `nirspi camera calibrate --white` has kept a flat field for the camera
     #[arg(long)]
     no_flat_field: bool,
 }

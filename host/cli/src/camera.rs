@@ -93,7 +93,7 @@ pub struct SceneArgs {
 /// Which simulated camera.
 #[derive(Debug, Clone, Args)]
 pub struct ModelArgs {
-    /// Description of the simulated camera: paper, fga015, one-metre, or a TOML file. `nirspi camera-model --print` prints
+    /// Description of the simulated camera: paper, fga015, one-metre, or a TOML file. `nirspi camera model --print` prints
     /// one to start from
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     pub camera_model: String,

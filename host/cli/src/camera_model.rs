@@ -1,4 +1,4 @@
-//! `nirspi camera-model`: evaluates or prints a camera description.
+//! `nirspi camera model`: evaluates or prints a camera description.
 
 use super::print;
 use super::report::ReportArgs;
@@ -13,8 +13,8 @@ use std::process::ExitCode;
 /// as `basis`. Every command that simulates takes one: --camera-model NAME or FILE.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi camera-model one-metre\n\
-    \x20 nirspi camera-model paper --print > lab.toml\n\
+    \x20 nirspi camera model one-metre\n\
+    \x20 nirspi camera model paper --print > lab.toml\n\
     \x20 nirspi demo --camera-model lab.toml --out demo/")]
 pub struct Args {
     /// paper, fga015, one-metre or a TOML file
@@ -76,7 +76,7 @@ fn say(report: &Report) -> Result<()> {
             1.0 + report.first_pixel_off
         ))?;
     }
-    let eyes = report.eye_safety.map(|light| format!("{light} (more: nirspi safety)"));
+    let eyes = report.eye_safety.map(|light| format!("{light} (more: nirspi camera safety)"));
     let refused = || report.eye_safety_refused.as_ref().map(|why| format!("refused: {why}"));
     eyes.or_else(refused).iter().try_for_each(|eyes| print::line(format_args!("eyes: {eyes}")))
 }

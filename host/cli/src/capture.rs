@@ -22,7 +22,7 @@ use std::sync::atomic::Ordering;
 
 /// Record frames of a camera into an MCAP file
 ///
-/// The command uses the ADC latency and the settling that `nirspi calibrate` or `nirspi selftest` saved for this camera. If
+/// The command uses the ADC latency and the settling that `nirspi camera calibrate` or `nirspi camera selftest` saved for this camera. If
 /// none are saved, the command measures them on the scene first. If the scene is too dark for this, the command ends with an
 /// error.
 ///

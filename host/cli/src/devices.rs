@@ -1,4 +1,4 @@
-//! `nirspi devices`: lists the cameras that answer.
+//! `nirspi camera devices`: lists the cameras that answer.
 
 use super::print;
 use super::report::ReportArgs;
@@ -8,12 +8,12 @@ use std::process::ExitCode;
 
 /// List the cameras that can be used
 ///
-/// The command looks at USB, at the TCP addresses given and at the default address of `nirspi virtual`. Serial ports are
+/// The command looks at USB, at the TCP addresses given and at the default address of `nirspi dev virtual`. Serial ports are
 /// listed but not opened, because another device may be connected there. The virtual camera is part of this program, so it
 /// is always listed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
-    \x20 nirspi devices --tcp 192.168.0.7:1550")]
+    \x20 nirspi camera devices --tcp 192.168.0.7:1550")]
 pub struct Args {
     /// Look at this address, too; may be given several times
     #[arg(long, value_name = "HOST:PORT")]

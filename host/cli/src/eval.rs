@@ -41,7 +41,7 @@ pub struct EvalArgs {
 #[derive(Debug, Subcommand)]
 enum Table {
     Table1(table1::Args),
-    /// Range in light and heavy rain: the same as `nirspi range`
+    /// Range in light and heavy rain: the same as `nirspi physics range`
     Table2(range::Args),
     Table3(table3::Args),
     Table4(table4::Args),

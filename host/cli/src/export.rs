@@ -1,4 +1,4 @@
-//! `nirspi export`, `recover`: a recording in another form, or repaired.
+//! `nirspi recording export`, `recover`: a recording in another form, or repaired.
 
 use super::camera::ModelArgs;
 use super::print;
@@ -12,7 +12,7 @@ use std::process::ExitCode;
 
 /// Write a recording in a form for other programs
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  nirspi export rec.mcap --to npz --out rec.npz")]
+#[command(after_help = "Example:\n  nirspi recording export rec.mcap --to npz --out rec.npz")]
 pub struct Args {
     /// Recording (.mcap)
     recording: PathBuf,
@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 /// Copy what can be read of a damaged recording into a new one, and say what is lost
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  nirspi recover rec.mcap --out whole.mcap")]
+#[command(after_help = "Example:\n  nirspi recording recover rec.mcap --out whole.mcap")]
 pub struct RecoverArgs {
     /// Recording (.mcap) that is damaged or cut short; the file stays as it is
     recording: PathBuf,

@@ -1,4 +1,4 @@
-//! `nirspi flash`: programs a board through a debug probe.
+//! `nirspi camera flash`: programs a board through a debug probe.
 
 use super::Usage;
 use anyhow::Result;
@@ -11,8 +11,8 @@ use std::process::ExitCode;
 /// No other program is needed: an ELF file of a release is enough. This command needs a build with the feature `flash`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi flash --board nucleo-u5a5zj-q\n\
-    \x20 nirspi flash --list")]
+    \x20 nirspi camera flash --board nucleo-u5a5zj-q\n\
+    \x20 nirspi camera flash --list")]
 pub struct Args {
     #[arg(long, value_name = "NAME", required_unless_present = "list", help = board_help())]
     board: Option<String>,
@@ -60,7 +60,7 @@ fn act(_: &Args, _: Option<(&'static Board, &'static str)>) -> Result<ExitCode> 
 #[cfg(not(feature = "flash"))]
 pub fn write(_chip: &str, _elf: &Path, _firmware: &[u8], _probe: Option<&str>) -> Result<()> {
     anyhow::bail!(
-        "this build cannot flash: cargo run --release --features flash -- flash ... (minutes to build), or flash with \
+        "this build cannot flash: cargo run --release --features flash -- camera flash ... (minutes to build), or flash with \
          probe-rs run from the board's folder"
     )
 }

@@ -1,4 +1,4 @@
-//! `nirspi gateware`: loads a bitstream into a camera's FPGA.
+//! `nirspi camera gateware`: loads a bitstream into a camera's FPGA.
 
 use super::address;
 use super::camera::{ModelArgs, SceneArgs};
@@ -20,7 +20,7 @@ use std::process::ExitCode;
 /// permanently. A board that cannot load gateware refuses.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
-    \x20 nirspi gateware target/gateware/ecp5-evn/nirspi.bit --camera usb")]
+    \x20 nirspi camera gateware target/gateware/ecp5-evn/nirspi.bit --camera usb")]
 pub struct Args {
     /// The bitstream, as `hdl/build.py` writes it
     #[arg(value_name = "FILE")]

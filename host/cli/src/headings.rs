@@ -1,26 +1,139 @@
-//! The headings under which help lists options. A group of options that several commands share has
-//! its heading where the group is defined; the options named here have the same heading everywhere.
+//! How help is arranged: the headings under which it lists options, and which options `-h` shows. A group of options that
+//! several commands share has its heading where the group is defined; the options named here have the same heading everywhere.
 
+use super::first_page;
 use clap::builder::Resettable;
 use clap::{Arg, Command};
 
-const HEADINGS: [(&str, &[&str]); 8] = [
+const HEADINGS: [(&str, &[&str]); 5] = [
     (
         "Measurement",
         &["frames", "light", "sum", "sampling", "order", "orders", "sweeps", "white", "dark"],
     ),
     ("Input", &["resize", "depth"]),
     ("Networks", &["ancestral"]),
-    ("One sphere", &["mie", "x", "m-re", "m-im"]),
-    ("Photon budget", &["budget", "reflectance", "exposure-us"]),
-    ("Rain simulator", &["uniformity", "rig", "tilt-deg"]),
     ("Output", &["out", "overwrite", "picture", "json"]),
-    ("Every command", &["quiet", "verbose", "settings", "save-settings"]),
+    ("Every command", &EVERY_COMMAND),
 ];
+
+/// Options of all commands, which `-h` leaves out.
+const EVERY_COMMAND: [&str; 5] = ["quiet", "verbose", "strict", "settings", "save-settings"];
+
+/// The most options that `-h` shows of a command, beside `-h` itself.
+const SHOWN_SHORT: usize = 11;
+
+/// What `-h` shows of a command that has more options than that.
+const SHORT: [(&str, &[&str]); 11] = [
+    (
+        "demo",
+        &["scene", "distance-m", "rain", "light", "sampling", "method", "seed", "out", "json"],
+    ),
+    (
+        "reconstruct",
+        &[
+            "sampling", "method", "index", "shown", "side", "field", "readings", "matrix",
+            "enhance", "out", "json",
+        ],
+    ),
+    (
+        "serve",
+        &[
+            "camera",
+            "listen",
+            "token",
+            "sampling",
+            "light",
+            "method",
+            "scene",
+            "distance-m",
+            "rain",
+            "record-to",
+        ],
+    ),
+    (
+        "capture",
+        &[
+            "camera",
+            "frames",
+            "light",
+            "sampling",
+            "order",
+            "scene",
+            "picture",
+            "out",
+            "overwrite",
+            "json",
+        ],
+    ),
+    (
+        "enhance",
+        &[
+            "depth",
+            "resize",
+            "blur-px",
+            "noise",
+            "interval",
+            "method",
+            "backend",
+            "out",
+            "overwrite",
+            "json",
+        ],
+    ),
+    (
+        "deblur",
+        &["model", "blur-px", "noise", "steps", "resize", "backend", "out", "overwrite", "json"],
+    ),
+    ("selftest", &["camera", "calibration", "scene", "camera-model", "json"]),
+    (
+        "virtual",
+        &["listen", "scene", "distance-m", "rain", "camera-model", "seed", "once", "real-time"],
+    ),
+    (
+        "pairs",
+        &[
+            "data",
+            "fonts",
+            "characters",
+            "camera-model",
+            "count",
+            "seed",
+            "out",
+            "overwrite",
+            "json",
+        ],
+    ),
+    (
+        "omp",
+        &[
+            "input",
+            "measurements",
+            "sparsity",
+            "frames",
+            "backend",
+            "precision",
+            "repeats",
+            "out",
+            "json",
+        ],
+    ),
+    (
+        "sampling",
+        &[
+            "index", "shown", "side", "field", "readings", "against", "sampling", "orders", "out",
+            "json",
+        ],
+    ),
+];
+
+/// The program with its help arranged: the first page, and each command's options.
+pub fn arranged(program: Command) -> Command {
+    first_page::on(command(program))
+}
 
 /// The command and its subcommands, with options under their headings. Every option with a value
 /// reads a negative number as its value, so that a message can say what is wrong with the number.
-pub fn arranged(command: Command) -> Command {
+fn command(command: Command) -> Command {
     let arrange = |arg: Arg| {
         let named =
             |(_, names): &&(&str, &[&str])| arg.get_long().is_some_and(|n| names.contains(&n));
@@ -34,5 +147,21 @@ pub fn arranged(command: Command) -> Command {
         let is_option = arg.get_action().takes_values() && !arg.is_positional();
         if is_option { arg.allow_negative_numbers(true) } else { arg }
     };
-    command.mut_args(arrange).mut_subcommands(arranged)
+    let options = command.get_opts().count() + command.get_arguments().filter(is_flag).count();
+    let chosen =
+        SHORT.iter().find(|(name, _)| *name == command.get_name()).map(|(_, names)| *names);
+    let is_long = |arg: &Arg| {
+        let Some(name) = arg.get_long().filter(|_| !arg.is_positional()) else { return false };
+        EVERY_COMMAND.contains(&name)
+            || options > SHOWN_SHORT && chosen.is_some_and(|chosen| !chosen.contains(&name))
+    };
+    let shorten = |arg: Arg| {
+        let hidden = is_long(&arg);
+        arg.hide_short_help(hidden)
+    };
+    command.mut_args(|arg| shorten(arrange(arg))).mut_subcommands(self::command)
+}
+
+fn is_flag(arg: &&Arg) -> bool {
+    !arg.get_action().takes_values() && arg.get_long().is_some()
 }

@@ -1,4 +1,4 @@
-//! `nirspi info`: who a camera is and what to update on it, or what a recording holds.
+//! `nirspi camera info`: who a camera is and what to update on it, or what a recording holds.
 
 use super::camera::{CameraArgs, ModelArgs, SceneArgs};
 use super::report::ReportArgs;
@@ -12,9 +12,9 @@ use std::process::ExitCode;
 /// Show a camera's identity and versions, and what to update; or what a recording holds
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi info --camera usb\n\
-    \x20 nirspi info --camera serial:/dev/ttyACM0 --json\n\
-    \x20 nirspi info rec.mcap")]
+    \x20 nirspi camera info --camera usb\n\
+    \x20 nirspi camera info --camera serial:/dev/ttyACM0 --json\n\
+    \x20 nirspi camera info rec.mcap")]
 pub struct Args {
     /// Recording (.mcap) to describe, instead of a camera
     recording: Option<PathBuf>,

@@ -20,6 +20,7 @@ mod enhance;
 mod eval;
 mod example;
 mod export;
+mod first_page;
 mod flash;
 mod gateware;
 mod headings;
@@ -67,11 +68,9 @@ const FEATURES: &[(&str, bool)] = &[
 static VERSION: LazyLock<String> =
     LazyLock::new(|| About::this_build(option_env!("NIRSPI_COMMIT"), FEATURES).to_string());
 
-/// An open near-infrared single-pixel camera: capture, virtual camera, reconstruction.
+/// nirspi, an open near-infrared single-pixel camera
 #[derive(Debug, Parser)]
 #[command(name = "nirspi", version, long_version = VERSION.as_str(), arg_required_else_help = true)]
-#[command(after_help = "Example, with no camera at hand:\n\
-    \x20 nirspi demo --out demo/")]
 struct Cli {
     #[command(flatten)]
     general: settings::GeneralArgs,
@@ -79,48 +78,76 @@ struct Cli {
     command: Command,
 }
 
-/// The commands: each with its arguments and the function that runs it.
+/// Commands: each with its arguments and the function that runs it.
 macro_rules! commands {
-    ($($name:ident($args:ty) => $run:path,)*) => {
+    ($commands:ident, $run:ident: $($(#[$about:meta])* $name:ident($args:ty) => $run_one:path,)*) => {
         #[derive(Debug, Subcommand)]
-        enum Command { $($name($args),)* }
+        enum $commands { $($(#[$about])* $name($args),)* }
 
-        fn run(command: Command) -> anyhow::Result<ExitCode> {
-            match command { $(Command::$name(args) => $run(&args),)* }
+        fn $run(command: &$commands) -> anyhow::Result<ExitCode> {
+            match command { $($commands::$name(args) => $run_one(args),)* }
         }
     };
 }
 
-commands! {
+commands! { Command, run:
     Demo(demo::Args) => demo::run,
     Example(example::Args) => example::run,
+    Serve(serve::Args) => serve::run,
     Reconstruct(reconstruct::Args) => reconstruct::run,
     Inspect(inspect::Args) => inspect::run,
     Readings(readings::Args) => readings::run,
+    Enhance(enhance::Args) => enhance::run,
+    Deblur(deblur::Args) => deblur::run,
+    Metrics(metrics::Args) => metrics::run,
+    /// Export or repair recordings
+    #[command(subcommand)]
+    Recording(RecordingCommand) => run_recording,
     Capture(capture::Args) => capture::run,
-    Export(export::Args) => export::run,
-    Recover(export::RecoverArgs) => export::recover,
-    Serve(serve::Args) => serve::run,
-    Virtual(serve_virtual::Args) => serve_virtual::run,
+    /// Find a camera, check and calibrate it, bring it up to date
+    #[command(subcommand)]
+    Camera(CameraCommand) => run_camera,
+    Eval(eval::EvalArgs) => eval::run,
+    /// Compute what rain does to light, and how far the camera sees
+    #[command(subcommand)]
+    Physics(PhysicsCommand) => run_physics,
+    /// Measure speed, make training pairs, serve the virtual camera, enlarge alone, package the program
+    #[command(subcommand)]
+    Dev(DevCommand) => run_dev,
+}
+
+commands! { CameraCommand, run_camera:
     Devices(devices::Args) => devices::run,
     Info(info::Args) => info::run,
-    Calibrate(calibrate::Args) => calibrate::run,
-    CameraModel(camera_model::Args) => camera_model::run,
-    Safety(safety::Args) => safety::run,
     Selftest(selftest::Args) => selftest::run,
-    Flash(flash::Args) => flash::run,
-    Gateware(gateware::Args) => gateware::run,
-    Update(update::Args) => update::run,
+    Calibrate(calibrate::Args) => calibrate::run,
+    Model(camera_model::Args) => camera_model::run,
+    Safety(safety::Args) => safety::run,
     Setup(setup::Args) => setup::run,
-    Upscale(upscale::Args) => upscale::run,
-    Deblur(deblur::Args) => deblur::run,
-    Enhance(enhance::Args) => enhance::run,
-    Metrics(metrics::Args) => metrics::run,
+    Update(update::Args) => update::run,
+    Gateware(gateware::Args) => gateware::run,
+    #[command(hide = !cfg!(feature = "flash"))]
+    Flash(flash::Args) => flash::run,
+}
+
+commands! { RecordingCommand, run_recording:
+    Export(export::Args) => export::run,
+    Recover(export::RecoverArgs) => export::recover,
+}
+
+commands! { PhysicsCommand, run_physics:
     Rain(rain::Args) => rain::run,
+    Budget(rain::BudgetArgs) => rain::budget,
+    Sphere(rain::SphereArgs) => rain::sphere,
+    Rig(rain::RigArgs) => rain::rig,
     Range(range::Args) => range::run,
-    Pairs(pairs::Args) => pairs::run,
+}
+
+commands! { DevCommand, run_dev:
     Bench(bench::Args) => bench::run,
-    Eval(eval::EvalArgs) => eval::run,
+    Pairs(pairs::Args) => pairs::run,
+    Upscale(upscale::Args) => upscale::run,
+    Virtual(serve_virtual::Args) => serve_virtual::run,
     Completions(packaging::CompletionsArgs) => packaging::completions,
     Man(packaging::ManArgs) => packaging::man,
 }
@@ -166,7 +193,7 @@ fn main() -> ExitCode {
         // Signals then end the program at once, and a capture with it.
         print::remark(format_args!("signals cannot be caught: {error}"));
     }
-    let done = run(cli.command).and_then(|code| settings.save(&cli.general).map(|()| code));
+    let done = run(&cli.command).and_then(|code| settings.save(&cli.general).map(|()| code));
     let done = done.map(|code| match cli.general.strict && print::has_warned() {
         true => ExitCode::FAILURE,
         false => code,

@@ -5,6 +5,7 @@ use super::{print, provenance, refused};
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use nirspi_eval::sets::{self, Align, Comparison, Options, Scaled};
+use nirspi_recon::words::count_of;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -14,7 +15,7 @@ use std::process::ExitCode;
 /// A stack is a .npy file of (N, H, W) or (H, W) numbers, a .npz file with `recon`, `image` or `images`, a PNG or JPEG
 /// picture, a folder of pictures, or a folder that `reconstruct` or `demo` has written. Numbers are in [0, 1]; nothing is
 /// scaled or fitted without --data-range or --align. The Fréchet character distance uses the features of this program's
-/// classifier and needs at least two images of 64 x 64 pixels. The report is JSON.
+/// classifier and needs at least two images of 64 x 64 pixels. --json also gives the figures of each image.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi metrics demo/truth.npy demo/reconstruction.npy --align gain-offset\n\
@@ -38,7 +39,7 @@ pub struct Args {
     #[arg(long, value_name = "R")]
     data_range: Option<f64>,
     #[command(flatten)]
-    _report: ReportArgs,
+    report: ReportArgs,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -68,6 +69,30 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let options = Options { labels: labels.as_deref(), legibility: args.legibility };
     let comparison = sets::compare(&reference, &test, &options).with_context(named)?;
     let align = if args.align.is_some() { "gain-offset" } else { "none" };
-    print::json(&Report { align, data_range, comparison }, &provenance::computed())?;
-    Ok(ExitCode::SUCCESS)
+    let report = Report { align, data_range, comparison };
+    args.report.print(&report, &provenance::computed(), say)
+}
+
+fn say(report: &Report) -> Result<()> {
+    let Comparison { images, height, width, mean_psnr_db, mean_ssim, sets, .. } =
+        &report.comparison;
+    let fitted = if report.align == "none" { "" } else { ", gain and offset fitted" };
+    print::line(format_args!("{} of {height} x {width}{fitted}", count_of(*images, "image")))?;
+    let psnr = mean_psnr_db.map_or_else(|| "identical".to_owned(), |db| format!("{db:.2} dB"));
+    print::line(format_args!(
+        "PSNR {psnr}, SSIM {mean_ssim:.3} (means; a range of {})",
+        report.data_range
+    ))?;
+    if let Some(distance) = sets.frechet_character_distance {
+        print::line(format_args!("Fréchet character distance {distance:.2} (0: the same set)"))?;
+    }
+    let shares = [
+        ("characters recognised", sets.character_accuracy),
+        ("read by Tesseract", sets.legibility),
+    ];
+    for (what, shares) in shares.into_iter().filter_map(|(what, shares)| Some((what, shares?))) {
+        let (reference, test) = (100.0 * shares.reference, 100.0 * shares.test);
+        print::line(format_args!("{what}: {test:.1} %, of the reference {reference:.1} %"))?;
+    }
+    sets.notes.iter().try_for_each(print::line)
 }

@@ -1,4 +1,4 @@
-//! `nirspi completions` and `nirspi man`: what a package of the program contains beside it.
+//! `nirspi dev completions` and `nirspi dev man`: what a package of the program contains beside it.
 
 use super::headings::arranged;
 use super::{Cli, print};
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 /// Print a shell's completion script
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
-    \x20 nirspi completions bash > ~/.local/share/bash-completion/completions/nirspi")]
+    \x20 nirspi dev completions bash > ~/.local/share/bash-completion/completions/nirspi")]
 pub struct CompletionsArgs {
     /// The shell
     shell: clap_complete::Shell,
@@ -20,7 +20,7 @@ pub struct CompletionsArgs {
 /// Write the manual pages, one a command
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
-    \x20 nirspi man ~/.local/share/man/man1/")]
+    \x20 nirspi dev man ~/.local/share/man/man1/")]
 pub struct ManArgs {
     /// Folder for the pages
     #[arg(value_name = "DIR")]

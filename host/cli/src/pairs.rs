@@ -1,4 +1,4 @@
-//! `nirspi pairs`: writes scenes and the virtual camera's pictures of them to a file.
+//! `nirspi dev pairs`: writes scenes and the virtual camera's pictures of them to a file.
 
 use crate::camera::ModelArgs;
 use crate::print;
@@ -23,8 +23,8 @@ use std::process::ExitCode;
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("letters").args(["data", "fonts"]).multiple(true))]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi pairs --data letters.npz --count 4000 --out pairs.npz\n\
-    \x20 nirspi pairs --data chars74k/ --characters letters/ --count 4000 --out pairs.npz")]
+    \x20 nirspi dev pairs --data letters.npz --count 4000 --out pairs.npz\n\
+    \x20 nirspi dev pairs --data chars74k/ --characters letters/ --count 4000 --out pairs.npz")]
 pub struct Args {
     /// Characters: a .npz stack (x, label, family or writer), a folder of such files, or Chars74K's folder; may be given
     /// several times. Without --data and --fonts, scenes are shapes

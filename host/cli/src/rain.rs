@@ -1,5 +1,5 @@
-//! `nirspi rain`: the effects of rain, fog and single drops on light; the photon budget; the rain
-//! simulator's uniformity.
+//! `nirspi physics rain`, `budget`, `sphere` and `rig`: the effects of rain, fog and single drops on light, the photon
+//! budget, the rain simulator's uniformity.
 
 use super::camera::ModelArgs;
 use super::{Usage, print, provenance, refused};
@@ -16,20 +16,84 @@ use nirspi_virtual::weather::{is_drop_file, read_drops};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Say what rain does to light: extinction, scattering, photon budget; one sphere; a rain simulator's uniformity
+/// Say what rain or fog does to light: extinction, scattering and absorption at each wavelength
 ///
-/// Without --mie, --budget, --uniformity or --rig, the command prints extinction, scattering and absorption of the rain or
-/// fog at each wavelength. The refractive index of water is Segelstein's, 400 to 2000 nm. --out writes curves of these
-/// against wavelength and drop size, of drop sizes and fall speeds, and of extinction against rain rate beside laws of
-/// measured optical links, each as PNG and CSV, and rain.json.
+/// The refractive index of water is Segelstein's, 400 to 2000 nm. --out writes curves of these against wavelength and drop
+/// size, of drop sizes and fall speeds, and of extinction against rain rate beside laws of measured optical links, each as
+/// PNG and CSV, and rain.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi rain --rate-mm-h 5.6\n\
-    \x20 nirspi rain --drops mono:2 --budget --distance-m 1\n\
-    \x20 nirspi rain --out rain/\n\
-    \x20 nirspi rain --mie --x 100 --m-re 1.33 --m-im 1e-4 --json\n\
-    \x20 nirspi rain --uniformity volumes.csv")]
+    \x20 nirspi physics rain --rate-mm-h 5.6\n\
+    \x20 nirspi physics rain --drops mono:2 --out rain/")]
 pub struct Args {
+    #[command(flatten)]
+    weather: WeatherArgs,
+    /// Folder for curves of rain, as PNG and CSV, and rain.json
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+/// Say where the light of one pixel goes, term by term: the photon budget in rain
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  nirspi physics budget --drops mono:2 --distance-m 1")]
+pub struct BudgetArgs {
+    #[command(flatten)]
+    weather: WeatherArgs,
+    /// Reflectance of the target
+    #[arg(long, value_name = "0..1", default_value_t = 1.0)]
+    reflectance: f64,
+    /// Exposure of each pattern in µs
+    #[arg(long, value_name = "US", default_value_t = 25.0)]
+    exposure_us: f64,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+/// Say what one sphere does to light, by Mie's theory: efficiencies and asymmetry
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  nirspi physics sphere --x 100 --m-re 1.33 --m-im 1e-4")]
+pub struct SphereArgs {
+    /// Size parameter, pi times diameter over wavelength
+    #[arg(long, value_name = "X")]
+    x: f64,
+    /// Real part of the refractive index
+    #[arg(long, value_name = "N")]
+    m_re: f64,
+    /// Imaginary part of the refractive index, positive for a sphere that absorbs
+    #[arg(long, value_name = "K", default_value_t = 0.0)]
+    m_im: f64,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+/// Say how even a rain simulator's rain is: Christiansen's uniformity coefficient
+///
+/// Without --volumes it is that of a simulated rain simulator of six nozzles, 1.2 x 0.6 x 0.5 m.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi physics rig --tilt-deg 5\n\
+    \x20 nirspi physics rig --volumes volumes.csv")]
+pub struct RigArgs {
+    /// Volumes that were collected: a CSV file whose last column holds them
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["tilt_deg", "seed"])]
+    volumes: Option<PathBuf>,
+    /// Tilt of the simulated rig's floor, in degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0)]
+    tilt_deg: f64,
+    /// Seed of the simulated rig
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    report: ReportArgs,
+}
+
+/// Rain or fog on the way, and the light that passes it.
+#[derive(Debug, clap::Args)]
+struct WeatherArgs {
     #[command(flatten)]
     drops: DropArgs,
     /// Wavelengths, in nm
@@ -38,46 +102,6 @@ pub struct Args {
     /// Distance of the target in metres; light passes it there and back
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     distance_m: f64,
-    /// One sphere: efficiencies for --x, --m-re and --m-im
-    #[arg(long, requires_all = ["x", "m_re"], group = "what")]
-    mie: bool,
-    /// Size parameter, pi times diameter over wavelength
-    #[arg(long, value_name = "X", requires = "mie")]
-    x: Option<f64>,
-    /// Real part of the refractive index
-    #[arg(long, value_name = "N", requires = "mie")]
-    m_re: Option<f64>,
-    /// Imaginary part of the refractive index, positive for a sphere that absorbs
-    #[arg(long, value_name = "K", requires = "mie", default_value_t = 0.0)]
-    m_im: f64,
-    /// The photon budget of one pixel, term by term
-    #[arg(long, group = "what")]
-    budget: bool,
-    /// Reflectance of the target, for --budget
-    #[arg(long, value_name = "0..1", requires = "budget", default_value_t = 1.0)]
-    reflectance: f64,
-    /// Exposure of each pattern in µs, for --budget
-    #[arg(long, value_name = "US", requires = "budget", default_value_t = 25.0)]
-    exposure_us: f64,
-    #[command(flatten)]
-    model: ModelArgs,
-    /// Christiansen's uniformity coefficient of collected volumes: a CSV file whose last column holds them
-    #[arg(long, value_name = "FILE", group = "what")]
-    uniformity: Option<PathBuf>,
-    /// Christiansen's uniformity coefficient of a simulated rain simulator of six nozzles, 1.2 x 0.6 x 0.5 m
-    #[arg(long, group = "what")]
-    rig: bool,
-    /// Tilt of the simulated rig's floor, in degrees
-    #[arg(long, value_name = "DEG", requires = "rig", default_value_t = 0.0)]
-    tilt_deg: f64,
-    /// Seed of the simulated rig
-    #[arg(long, value_name = "N", requires = "rig", default_value_t = 1)]
-    seed: u64,
-    /// Folder for curves of rain, as PNG and CSV, and rain.json
-    #[arg(long, value_name = "DIR", conflicts_with = "what")]
-    out: Option<PathBuf>,
-    #[command(flatten)]
-    report: ReportArgs,
 }
 
 /// What falls.
@@ -115,68 +139,67 @@ impl DropArgs {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    if args.mie {
-        sphere(args)
-    } else if let Some(path) = &args.uniformity {
-        let volumes = Table::read(path)?.last_column()?;
-        let report = rig::measured(&volumes).with_context(|| path.display().to_string())?;
-        args.report.print(&report, &provenance::simulated(), say_uniformity)
-    } else if args.rig {
-        let report = rig::simulated(args.tilt_deg, args.seed).map_err(refused)?;
-        args.report.print(&report, &provenance::simulated(), say_uniformity)
-    } else if args.budget {
-        let settings = Settings {
-            drops: args.drops.drops()?,
-            distance_m: args.distance_m,
-            reflectance: args.reflectance,
-            exposure_us: args.exposure_us,
-            wavelengths_nm: args.wavelengths_nm.clone(),
-            camera: args.model.read()?,
-        };
-        let report = budget::budget(&settings).map_err(refused)?;
-        args.report.print(&report, &provenance::simulated(), say_budget)
-    } else {
-        let (name, drops) = (&args.drops.drops, args.drops.drops()?);
-        let radar = !name.starts_with("fog");
-        let report = rain::rain(name, &drops, &args.wavelengths_nm, args.distance_m, radar)
-            .map_err(refused)?;
-        let report = RainReport { asked_mm_per_h: args.drops.asked_mm_per_h(), ..report };
-        if let Some(path) = &args.out {
-            let curves = curves::curves(name, &drops, &args.wavelengths_nm).map_err(refused)?;
-            let provenance = provenance::simulated();
-            let mut out = OutputDir::create(path)?;
-            for curves in &curves {
-                let picture = signed_png(&curves.chart.render(), &provenance);
-                out.write(&format!("{}.png", curves.name), &picture)?;
-                out.write(&format!("{}.csv", curves.name), curves.csv().as_bytes())?;
-            }
-            out.write("rain.json", provenance.sign(&report)?.as_bytes())?;
-            out.commit()?;
+    let WeatherArgs { drops: asked, wavelengths_nm, distance_m } = &args.weather;
+    let (name, drops) = (&asked.drops, asked.drops()?);
+    let radar = !name.starts_with("fog");
+    let report = rain::rain(name, &drops, wavelengths_nm, *distance_m, radar).map_err(refused)?;
+    let report = RainReport { asked_mm_per_h: asked.asked_mm_per_h(), ..report };
+    if let Some(path) = &args.out {
+        let curves = curves::curves(name, &drops, wavelengths_nm).map_err(refused)?;
+        let provenance = provenance::simulated();
+        let mut out = OutputDir::create(path)?;
+        for curves in &curves {
+            let picture = signed_png(&curves.chart.render(), &provenance);
+            out.write(&format!("{}.png", curves.name), &picture)?;
+            out.write(&format!("{}.csv", curves.name), curves.csv().as_bytes())?;
         }
-        args.report.print(&report, &provenance::simulated(), |report| {
-            say(report)?;
-            args.out.as_ref().map_or(Ok(()), |path| {
-                let path = path.display();
-                print::line(format_args!("wrote curves as PNG and CSV, and rain.json, to {path}"))
-            })
-        })
+        out.write("rain.json", provenance.sign(&report)?.as_bytes())?;
+        out.commit()?;
     }
+    args.report.print(&report, &provenance::simulated(), |report| {
+        say(report)?;
+        args.out.as_ref().map_or(Ok(()), |path| {
+            let path = path.display();
+            print::line(format_args!("wrote curves as PNG and CSV, and rain.json, to {path}"))
+        })
+    })
 }
 
-fn sphere(args: &Args) -> Result<ExitCode> {
-    let (Some(x), Some(m_re)) = (args.x, args.m_re) else {
-        return Err(Usage("--mie needs --x and --m-re".to_owned()).into());
+pub fn budget(args: &BudgetArgs) -> Result<ExitCode> {
+    let settings = Settings {
+        drops: args.weather.drops.drops()?,
+        distance_m: args.weather.distance_m,
+        reflectance: args.reflectance,
+        exposure_us: args.exposure_us,
+        wavelengths_nm: args.weather.wavelengths_nm.clone(),
+        camera: args.model.read()?,
     };
-    let index = Index { real: m_re, imaginary: args.m_im };
-    let report = rain::sphere(x, index).map_err(refused)?;
-    args.report.print(&report, &provenance::simulated(), |report| {
-        print::line(format_args!("x = {x}, m = {m_re} + {}i", args.m_im))?;
+    let report = budget::budget(&settings).map_err(refused)?;
+    args.report.print(&report, &provenance::simulated(), say_budget)
+}
+
+pub fn sphere(args: &SphereArgs) -> Result<ExitCode> {
+    let SphereArgs { x, m_re, m_im, report: printer } = args;
+    let report = rain::sphere(*x, Index { real: *m_re, imaginary: *m_im }).map_err(refused)?;
+    printer.print(&report, &provenance::simulated(), |report| {
+        print::line(format_args!("x = {x}, m = {m_re} + {m_im}i"))?;
         print::line(format_args!("Q_ext  {:.9e}", report.qext))?;
         print::line(format_args!("Q_sca  {:.9e}", report.qsca))?;
         print::line(format_args!("Q_abs  {:.9e}", report.qabs))?;
         print::line(format_args!("Q_back {:.9e}", report.qback))?;
         print::line(format_args!("g      {:.9}", report.g))
     })
+}
+
+pub fn rig(args: &RigArgs) -> Result<ExitCode> {
+    let report = match &args.volumes {
+        Some(path) => {
+            let volumes = Table::read(path)?.last_column()?;
+            rig::measured(&volumes).with_context(|| path.display().to_string())?
+        }
+        None => rig::simulated(args.tilt_deg, args.seed).map_err(refused)?,
+    };
+    args.report.print(&report, &provenance::simulated(), say_uniformity)
 }
 
 fn say(report: &RainReport) -> Result<()> {

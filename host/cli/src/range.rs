@@ -1,4 +1,4 @@
-//! `nirspi range`: the range of the camera in rain (the paper's Algorithm 2 and Table 2).
+//! `nirspi physics range`: the range of the camera in rain (the paper's Algorithm 2 and Table 2).
 
 use super::camera::ModelArgs;
 use super::{print, provenance, refused};
@@ -20,8 +20,8 @@ use std::process::ExitCode;
 /// of this camera and of the shipped ones.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi range\n\
-    \x20 nirspi range --snr 2 --reflectance 0.5 --out range/")]
+    \x20 nirspi physics range\n\
+    \x20 nirspi physics range --snr 2 --reflectance 0.5 --out range/")]
 pub struct Args {
     /// Signal of a pixel over its noise at the farthest distance
     #[arg(long, value_name = "SNR", default_value_t = 1.0)]

@@ -1,4 +1,4 @@
-//! `nirspi safety`: the safety case of a camera's light.
+//! `nirspi camera safety`: the safety case of a camera's light.
 
 use super::print;
 use super::report::ReportArgs;
@@ -13,8 +13,8 @@ use std::process::ExitCode;
 /// camera, and this is no certificate.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi safety\n\
-    \x20 nirspi safety lab.toml --json")]
+    \x20 nirspi camera safety\n\
+    \x20 nirspi camera safety lab.toml --json")]
 pub struct Args {
     /// paper, fga015, one-metre or a TOML file
     #[arg(value_name = "NAME|FILE", default_value = "paper")]

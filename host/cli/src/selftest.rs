@@ -1,4 +1,4 @@
-//! `nirspi selftest`: checks a camera end to end, and keeps its calibration.
+//! `nirspi camera selftest`: checks a camera end to end, and keeps its calibration.
 
 use super::camera::{CameraArgs, SceneArgs};
 use super::progress::Progress;
@@ -24,8 +24,8 @@ const LINK_DURATION: Duration = Duration::from_secs(1);
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("scene", |scene| scene.default_value("white")))]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi selftest --camera usb\n\
-    \x20 nirspi selftest --camera virtual --json")]
+    \x20 nirspi camera selftest --camera usb\n\
+    \x20 nirspi camera selftest --camera virtual --json")]
 pub struct Args {
     #[command(flatten)]
     camera: CameraArgs,

@@ -1,4 +1,4 @@
-//! `nirspi virtual`: the virtual camera behind a TCP port.
+//! `nirspi dev virtual`: the virtual camera behind a TCP port.
 
 use super::camera::SceneArgs;
 use super::print;
@@ -16,8 +16,8 @@ use std::sync::atomic::AtomicBool;
 /// The virtual camera serves one host at a time. Port 0 takes a free port; the first line of output names it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi virtual --listen 127.0.0.1:1550 --scene letter:R\n\
-    \x20 nirspi virtual --tunnel 127.0.0.1:1551      the firmware in QEMU: boards/mps2-an505")]
+    \x20 nirspi dev virtual --listen 127.0.0.1:1550 --scene letter:R\n\
+    \x20 nirspi dev virtual --tunnel 127.0.0.1:1551      the firmware in QEMU: boards/mps2-an505")]
 pub struct Args {
     /// Address to listen on
     #[arg(long, value_name = "ADDR", default_value = nirspi::devices::DEFAULT_TCP)]

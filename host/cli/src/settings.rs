@@ -33,11 +33,11 @@ pub struct GeneralArgs {
     pub verbose: bool,
     /// Take defaults for options from this file (TOML): `frames = 1000` stands for --frames 1000. The environment variable
     /// NIRSPI_FRAMES beats the file, and the command line beats both
-    #[arg(long, visible_alias = "setup", value_name = "FILE", global = true)]
+    #[arg(long, value_name = "FILE", global = true)]
     settings: Option<PathBuf>,
     /// When the command has succeeded, save its options in this file, as the table of the command. --out, --overwrite,
     /// --json and --token are left out
-    #[arg(long, visible_alias = "save-setup", value_name = "FILE", global = true)]
+    #[arg(long, value_name = "FILE", global = true)]
     save_settings: Option<PathBuf>,
 }
 

@@ -1,4 +1,4 @@
-//! `nirspi setup`: prepares a machine for cameras on USB.
+//! `nirspi camera setup`: prepares a machine for cameras on USB.
 
 use super::{Usage, print};
 use anyhow::Result;
@@ -12,9 +12,9 @@ use std::process::{Command, ExitCode, Stdio};
 /// lets a group of users open it too, over SSH and in services. Nothing has to be done on other systems.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi setup --check\n\
-    \x20 sudo nirspi setup\n\
-    \x20 sudo nirspi setup --group plugdev")]
+    \x20 nirspi camera setup --check\n\
+    \x20 sudo nirspi camera setup\n\
+    \x20 sudo nirspi camera setup --group plugdev")]
 pub struct Args {
     /// Only say whether the rule is installed; exit code 1 if not
     #[arg(long)]
@@ -44,11 +44,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.check {
         let (text, code) = match check(folder)? {
             Installed::Yes => (format!("{path} is installed"), ExitCode::SUCCESS),
-            Installed::Other => {
-                (format!("{path} is of another version: sudo nirspi setup"), ExitCode::FAILURE)
-            }
+            Installed::Other => (
+                format!("{path} is of another version: sudo nirspi camera setup"),
+                ExitCode::FAILURE,
+            ),
             Installed::No => {
-                (format!("{path} is not installed: sudo nirspi setup"), ExitCode::FAILURE)
+                (format!("{path} is not installed: sudo nirspi camera setup"), ExitCode::FAILURE)
             }
         };
         print::line(text)?;

@@ -1,4 +1,4 @@
-//! `nirspi update`: brings a camera to the versions of a release.
+//! `nirspi camera update`: brings a camera to the versions of a release.
 
 use super::progress::Progress;
 use super::report::ReportArgs;
@@ -15,8 +15,8 @@ use std::process::ExitCode;
 /// the camera; a load that was cut goes on where it stopped. Firmware goes through a debug probe (feature `flash`).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi update nirspi-0.1.0-firmware/ --camera usb --check\n\
-    \x20 nirspi update nirspi-0.1.0-firmware/ecp5-evn.bit --camera usb")]
+    \x20 nirspi camera update nirspi-0.1.0-firmware/ --camera usb --check\n\
+    \x20 nirspi camera update nirspi-0.1.0-firmware/ecp5-evn.bit --camera usb")]
 pub struct Args {
     /// A release folder, with release.json in it, or one of its files
     #[arg(value_name = "RELEASE")]
@@ -27,7 +27,7 @@ pub struct Args {
     /// Say what would change, and change nothing
     #[arg(long)]
     check: bool,
-    /// Which debug probe, where there are several: VID:PID:SERIAL as `nirspi flash --list` shows it
+    /// Which debug probe, where there are several: VID:PID:SERIAL as `nirspi camera flash --list` shows it
     #[arg(long, value_name = "PROBE")]
     probe: Option<String>,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `nirspi upscale`: the fusion stage alone.
+//! `nirspi dev upscale`: the fusion stage alone.
 
 use super::networks::{ImageArgs, checked};
 use super::print;
@@ -18,8 +18,8 @@ use std::process::ExitCode;
 /// pictures. It removes noise but not blur; `nirspi enhance` removes both.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi upscale measured.npy --out large.npy\n\
-    \x20 nirspi upscale measured.npy --depth tof.npy --out large/")]
+    \x20 nirspi dev upscale measured.npy --out large.npy\n\
+    \x20 nirspi dev upscale measured.npy --depth tof.npy --out large/")]
 pub struct Args {
     #[command(flatten)]
     depth: DepthArgs,

@@ -97,7 +97,7 @@ bench() {
     local name=$1 seconds result=0
     shift
     seconds=$(left 60 "$*") || return 0
-    timeout --kill-after=5 "$seconds" "$work/nirspi" bench "$@" >"$work/report" 2>"$work/error" || result=$?
+    timeout --kill-after=5 "$seconds" "$work/nirspi" dev bench "$@" >"$work/report" 2>"$work/error" || result=$?
     case $result in
     0) ;;
     124 | 137)
@@ -131,13 +131,13 @@ correctness() {
     if needs compute-sanitizer memcheck; then
         # Accesses outside buffers: kernels do not check their indices.
         step memcheck 90 compute-sanitizer --tool memcheck --error-exitcode 9 \
-            "$work/nirspi" bench pipeline --frames 4 --repeats 1 --backend cuda || failed=1
+            "$work/nirspi" dev bench pipeline --frames 4 --repeats 1 --backend cuda || failed=1
         step memcheck-f16 90 compute-sanitizer --tool memcheck --error-exitcode 9 \
-            "$work/nirspi" bench enhance --frames 4 --repeats 1 --backend cuda --precision f16 || failed=1
+            "$work/nirspi" dev bench enhance --frames 4 --repeats 1 --backend cuda --precision f16 || failed=1
         # Units that do not wait for each other: software Vulkan takes them in turns.
         for precision in f32 f16; do
             step "racecheck-$precision" 120 compute-sanitizer --tool racecheck --error-exitcode 9 \
-                "$work/nirspi" bench enhance --frames 1 --repeats 1 --backend cuda --no-consistency --precision "$precision" ||
+                "$work/nirspi" dev bench enhance --frames 1 --repeats 1 --backend cuda --no-consistency --precision "$precision" ||
                 failed=1
         done
         NIRSPI_TEST_BACKEND=cuda step racecheck-omp 60 compute-sanitizer --tool racecheck --error-exitcode 9 \
@@ -218,7 +218,7 @@ peers() {
 profile() {
     local precision
     for precision in f32 f16; do
-        local what=("$work/nirspi" bench enhance --frames 256 --repeats 1 --backend cuda --no-consistency --precision "$precision")
+        local what=("$work/nirspi" dev bench enhance --frames 256 --repeats 1 --backend cuda --no-consistency --precision "$precision")
         if needs ncu "ncu-$precision" && needs python3 "kernels-$precision"; then
             # Every kernel, those of the comparison with the plain ones too. The clock is left as it is.
             step "ncu-$precision" 150 ncu --clock-control none --metrics "$(metrics)" --csv --page raw \

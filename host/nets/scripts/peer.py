@@ -1,4 +1,4 @@
-"""The shipped networks in PyTorch, timed as `nirspi bench enhance --no-consistency` times them here: estimator, FSRCNN and one step of
+"""The shipped networks in PyTorch, timed as `nirspi dev bench enhance --no-consistency` times them here: estimator, FSRCNN and one step of
 the bridge, on frames in the host's memory.
 
 usage: peer.py [--device cpu|cuda] [--frames B] [--batch N] [--repeats R] [--threads T] [--compile graph|max-autotune|default]

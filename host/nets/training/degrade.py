@@ -24,7 +24,7 @@ class Characters(Degrader):
         self.photographs = torch.tensor([kind in self.PHOTOGRAPHS for kind in self.SHARE], device=device)
         labels = [file[f"{kind}_label"] if f"{kind}_label" in file else np.full(n, -1) for kind, n in zip(self.SHARE, counts)]
         self.labels = torch.from_numpy(np.concatenate(labels).astype(np.int64)).to(device)
-        # Pairs made by the virtual camera (`nirspi pairs`), where there are some: pairs*.npz.
+        # Pairs made by the virtual camera (`nirspi dev pairs`), where there are some: pairs*.npz.
         files = [np.load(path) for path in sorted(glob.glob(f"{folder}/pairs*.npz"))]
         self.pairs = None
         if files:

@@ -15,7 +15,7 @@ fn json(report: &impl Serialize) -> PyResult<String> {
     serde_json::to_string(report).map_err(|error| refused(error.to_string()))
 }
 
-/// The report of `nirspi rain` as JSON.
+/// The report of `nirspi physics rain` as JSON.
 #[pyfunction]
 pub fn rain(
     py: Python<'_>,
@@ -42,7 +42,7 @@ pub fn rain(
     json(&report)
 }
 
-/// Efficiencies of a sphere, of `nirspi rain --mie`, as JSON.
+/// Efficiencies of a sphere, of `nirspi physics sphere`, as JSON.
 #[pyfunction]
 pub fn mie(py: Python<'_>, x: f64, real: f64, imaginary: f64) -> PyResult<String> {
     json(&long(py, |_| effects::sphere(x, Index { real, imaginary }).map_err(refusal))?)

@@ -32,7 +32,7 @@ def off(camera):
 def served(cli):
     """The virtual camera in another process, behind TCP."""
     server = subprocess.Popen(
-        [cli, "virtual", "--listen", "127.0.0.1:0", "--precompute", "4"],
+        [cli, "dev", "virtual", "--listen", "127.0.0.1:0", "--precompute", "4"],
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -123,7 +123,7 @@ def test_unequal_leds_leave_no_pattern():
 
 
 def test_a_kept_flat_field_of_a_camera_is_used(cli, tmp_path, monkeypatch):
-    """As `nirspi calibrate --white` keeps it by serial number."""
+    """As `nirspi camera calibrate --white` keeps it by serial number."""
     for variable in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(variable, str(tmp_path))
     (tmp_path / "uneven.toml").write_text("[leds]\npower_spread = 0.2\n")
@@ -146,7 +146,7 @@ def test_a_kept_flat_field_of_a_camera_is_used(cli, tmp_path, monkeypatch):
     try:
         address = next(m[0] for line in server.stdout if (m := re.search(r"tcp:[0-9.:]*[0-9]", line)))
         made = subprocess.run(
-            [cli, "calibrate", "--camera", address, "--white"], capture_output=True, text=True, check=False
+            [cli, "camera", "calibrate", "--camera", address, "--white"], capture_output=True, text=True, check=False
         )
         assert made.returncode == 0, made.stderr
         with ns.Camera(address) as camera:

@@ -65,7 +65,7 @@ def test_the_parts_of_a_split_capture_are_the_frames_of_one(cli, tmp_path):
     # A program that reads exported files gets the same frames of each part.
     exported = []
     for file in [tmp_path / "whole.mcap", *files]:
-        run(cli, "export", file, "--to", "npz", "--out", file.with_suffix(".npz"))
+        run(cli, "recording", "export", file, "--to", "npz", "--out", file.with_suffix(".npz"))
         exported.append(np.load(file.with_suffix(".npz"))["frames"])
     assert (np.concatenate(exported[1:]) == exported[0]).all()
 
@@ -93,7 +93,7 @@ def test_metrics(cli, tmp_path, random):
     a, b = random.random((2, 3, 32, 32), np.float32)
     np.save(tmp_path / "a.npy", a)
     np.save(tmp_path / "b.npy", b * 3 - 1)
-    report = json.loads(run(cli, "metrics", tmp_path / "a.npy", tmp_path / "b.npy", "--align", "gain-offset"))
+    report = json.loads(run(cli, "metrics", tmp_path / "a.npy", tmp_path / "b.npy", "--align", "gain-offset", "--json"))
     found = ns.metrics.compare(a, b * 3 - 1, align="gain-offset")
     assert [one["psnr_db"] for one in report["each"]] == found["psnr_db"].tolist()
     assert [one["ssim"] for one in report["each"]] == found["ssim"].tolist()
@@ -112,17 +112,17 @@ def test_a_recording_as_a_sum_and_frame_by_frame(cli, tmp_path):
 
 
 def test_rain_and_spheres(cli):
-    report = json.loads(run(cli, "rain", "--rate-mm-h", "5.6", "--drops", "mono:2", "--json"))
+    report = json.loads(run(cli, "physics", "rain", "--rate-mm-h", "5.6", "--drops", "mono:2", "--json"))
     assert report.pop("provenance")["origin"] == "simulated"
     found = ns.rain.extinction(5.6, wavelengths_nm=[550, 850, 1550], drops="mono:2")
     assert found == report
-    sphere = json.loads(run(cli, "rain", "--mie", "--x", "100", "--m-re", "1.33", "--m-im", "1e-4", "--json"))
+    sphere = json.loads(run(cli, "physics", "sphere", "--x", "100", "--m-re", "1.33", "--m-im", "1e-4", "--json"))
     assert sphere.pop("provenance")["origin"] == "simulated"
     assert ns.rain.mie(100, 1.33 + 1e-4j) == sphere
 
 
 def test_a_camera_description(cli):
-    assert ns.CameraModel("one-metre").report == json.loads(run(cli, "camera-model", "one-metre", "--json"))
+    assert ns.CameraModel("one-metre").report == json.loads(run(cli, "camera", "model", "one-metre", "--json"))
 
 
 def test_measurements_of_other_groups(cli, data, tmp_path):

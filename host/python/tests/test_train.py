@@ -495,7 +495,7 @@ def test_a_signal_that_is_ignored_stays_ignored(tmp_path, monkeypatch):
 def test_pairs_and_characters_that_the_program_makes_are_trained_on(tmp_path, cli):
     letters(tmp_path / "own.npz", groups=10)
     options = ["--held-out", "0.1", "--count", "6", "--characters", "letters", "--out", "pairs.npz"]
-    command_line = [cli, "pairs", "--data", "own.npz", *options]
+    command_line = [cli, "dev", "pairs", "--data", "own.npz", *options]
     subprocess.run(command_line, cwd=tmp_path, check=True, capture_output=True)
     (written,), (given,) = data.read([tmp_path / "letters"]), data.read([tmp_path / "own.npz"])
     assert (written.images == given.images).all() and (written.groups == given.groups).all()

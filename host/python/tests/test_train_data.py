@@ -19,7 +19,7 @@ def letters(path, groups=6, each=4, seed=3, **changed):
 
 
 def pairs(path, stack, group):
-    """Pairs as `nirspi pairs` writes them, of these stacks and groups."""
+    """Pairs as `nirspi dev pairs` writes them, of these stacks and groups."""
     count, random = len(stack), np.random.default_rng(5)
     image = {
         name: random.random((count, n, n), np.float32)

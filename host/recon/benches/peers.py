@@ -93,7 +93,7 @@ class Nirspi:
         # A solution of its own for each program: `bench omp` replaces no file.
         self.path, self.out = os.path.join(folder, "problem.npz"), os.path.join(folder, f"{'-'.join(options)}solution.npz")
         np.savez(self.path, D=d, Y=y, k=k)
-        self.command = [binary, "bench", "omp", "--input", self.path, "--out", self.out,
+        self.command = [binary, "dev", "bench", "omp", "--input", self.path, "--out", self.out,
                         "--repeats", str(repeats), *options]
         self.prepare = []
 

@@ -152,7 +152,7 @@ impl CameraAddress {
     pub fn min_frames_per_s(&self) -> f64 {
         match self {
             // Three quarters of the rate that the boards' link to the FPGA allows, by the estimate
-            // in docs/firmware.md.
+            // in docs/log/firmware.md.
             Self::Usb(_) => 300.0,
             _ => 0.0,
         }
@@ -161,7 +161,9 @@ impl CameraAddress {
 
 fn serial_problem(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::NotFound => "there is no such port: nirspi devices lists them".to_owned(),
+        io::ErrorKind::NotFound => {
+            "there is no such port: nirspi camera devices lists them".to_owned()
+        }
         io::ErrorKind::PermissionDenied if cfg!(target_os = "linux") => {
             "no permission: sudo usermod -aG dialout $USER, then log in again".to_owned()
         }

@@ -213,7 +213,7 @@ pub enum CaptureError {
     Session(#[from] SessionError),
     /// Latency and settling could not be measured, and are not known from before.
     #[error(
-        "the camera's ADC latency is not known (hold a white sheet before the camera and run nirspi calibrate once, or name \
+        "the camera's ADC latency is not known (hold a white sheet before the camera and run nirspi camera calibrate once, or name \
          a latency that you know with --no-calibration --adc-latency N)"
     )]
     Calibration(#[source] CalibrationError),

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::{fmt, io};
 use thiserror::Error;
 
-/// Default address of `nirspi virtual`.
+/// Default address of `nirspi dev virtual`.
 pub const DEFAULT_TCP: &str = "127.0.0.1:1550";
 
 /// One camera, with its address for `--camera`.
@@ -168,7 +168,7 @@ fn on_serial_ports() -> Vec<Device> {
     let ports = serial_ports().unwrap_or_default();
     let device = |port: PathBuf| {
         let camera = format!("serial:{}", port.display());
-        let note = format!("a serial port, not opened: nirspi info --camera {camera}");
+        let note = format!("a serial port, not opened: nirspi camera info --camera {camera}");
         Device::new(camera).noting(&note)
     };
     ports.into_iter().map(device).collect()

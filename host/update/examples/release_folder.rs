@@ -1,4 +1,4 @@
-//! Makes a release folder, as `nirspi update` takes it, from the firmware (`boards/build.sh`) and gateware
+//! Makes a release folder, as `nirspi camera update` takes it, from the firmware (`boards/build.sh`) and gateware
 //! (`hdl/build.py`) that were built in this checkout: `cargo run --example release_folder -- OUT`.
 
 use nirspi_update::{Source, pack};

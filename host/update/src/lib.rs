@@ -41,7 +41,7 @@ pub enum UpdateError {
     File(#[from] FileError),
     /// There is no manifest.
     #[error(
-        "{}: no {MANIFEST} there, expected a release folder or a file in one; nirspi gateware and nirspi flash take \
+        "{}: no {MANIFEST} there, expected a release folder or a file in one; nirspi camera gateware and nirspi camera flash take \
          files of no release", .0.display()
     )]
     NoManifest(PathBuf),
@@ -149,7 +149,7 @@ pub enum UpdateError {
     },
     /// The gateware is not a camera's.
     #[error(
-        "{file}: this gateware is the bring-up design, expected a camera's; load another with nirspi gateware FILE"
+        "{file}: this gateware is the bring-up design, expected a camera's; load another with nirspi camera gateware FILE"
     )]
     BringUp {
         /// The file of the release.

@@ -54,7 +54,7 @@ pub enum VirtualOpticsError {
     /// Gateware and protocol support one wavelength only.
     #[error(
         "wavelength_nm is {0}, expected {expected} for a virtual camera: its protocol knows no other; \
-         `nirspi range` and `nirspi rain --budget` take any",
+         `nirspi physics range` and `nirspi physics budget` take any",
         expected = nirspi_wire::WAVELENGTH_NM
     )]
     Wavelength(f64),

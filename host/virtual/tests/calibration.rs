@@ -48,7 +48,7 @@ fn a_dark_scene_uses_the_kept_latency_or_fails() {
         "{error:?}"
     );
     let line = error.to_string();
-    assert!(line.contains("nirspi calibrate") && line.contains("--adc-latency"), "{line}");
+    assert!(line.contains("nirspi camera calibrate") && line.contains("--adc-latency"), "{line}");
 
     let captured = with(Calibration::MeasureOr(settling.clone())).unwrap();
     assert_eq!(captured.setup.adc_latency, settling.adc_latency);

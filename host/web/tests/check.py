@@ -94,7 +94,7 @@ class Camera:
 
     def __init__(self, program):
         self.process = subprocess.Popen(
-            [program, "virtual", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+            [program, "dev", "virtual", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
         address = self.process.stdout.readline().split("tcp:")[1].split(": ")[0]
         self.place = (address.rsplit(":", 1)[0], int(address.rsplit(":", 1)[1]))

@@ -1,4 +1,4 @@
-//! The released ELF of a board on a model of its chip: `docs/silicon.md`.
+//! The released ELF of a board on a model of its chip: `docs/log/silicon.md`.
 #![cfg_attr(not(test), expect(dead_code, reason = "the tests use all of this, the program a part"))]
 
 mod camera;

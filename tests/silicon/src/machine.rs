@@ -12,7 +12,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Clocks of the core for an instruction, on average: an estimate, that of `docs/firmware.md`.
+/// Clocks of the core for an instruction, on average: an estimate, that of `docs/log/firmware.md`.
 pub const CLOCKS_AN_INSTRUCTION: f64 = 1.3;
 
 const FLASH: u32 = 0x0800_0000;

@@ -254,7 +254,7 @@ fn a_frame_costs_no_more_instructions_than_budgeted() {
         let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
         line.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("no {name}: {text}"))
     };
-    let rows = table(&page("docs/firmware.md"), "### Instructions");
+    let rows = table(&page("docs/log/firmware.md"), "### Instructions");
     assert!(rows.len() >= 5);
     for row in rows {
         let budget: u32 = row[2].replace(' ', "").parse().unwrap();

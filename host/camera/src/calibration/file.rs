@@ -23,16 +23,16 @@ impl Kept {
     /// The commands that write such a file.
     fn writers(self) -> &'static str {
         match self {
-            Self::Calibration => "nirspi calibrate or nirspi selftest",
-            Self::FlatField => "nirspi calibrate --white",
+            Self::Calibration => "nirspi camera calibrate or nirspi camera selftest",
+            Self::FlatField => "nirspi camera calibrate --white",
         }
     }
 
     /// The command that measures it again.
     fn again(self) -> &'static str {
         match self {
-            Self::Calibration => "nirspi calibrate",
-            Self::FlatField => "nirspi calibrate --white",
+            Self::Calibration => "nirspi camera calibrate",
+            Self::FlatField => "nirspi camera calibrate --white",
         }
     }
 

@@ -2,7 +2,7 @@
 //! for a capture.
 //!
 //! Latency belongs to the instrument and not to the scene. Latency is measured against a white
-//! sheet (`nirspi calibrate`, `nirspi selftest`), kept, and used for every later capture.
+//! sheet (`nirspi camera calibrate`, `nirspi camera selftest`), kept, and used for every later capture.
 //!
 //! # Invariant
 //! Every capture runs with a latency that was measured or that the user gave

@@ -99,7 +99,7 @@ pub fn check(
     if dead.count() > 0 {
         let note = format!(
             "{dead}: stuck, broken, or the target is dark there; test with a white sheet before the \
-             camera (nirspi virtual --scene white)"
+             camera (nirspi dev virtual --scene white)"
         );
         return Ok(vec![lines.noting(&note), Check::skipped(SUPPLY, "needs all lines")]);
     }

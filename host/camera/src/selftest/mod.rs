@@ -222,7 +222,7 @@ fn sampling_phase(found: Sampling) -> Check {
         Sampling::NoPattern => Check::skipped(
             SAMPLING,
             "no phase shows the ADC's checkerboard. Wire the ADC's serial port, or compare a raw burst of its test \
-             pattern by hand (docs/gateware.md, ADC interface)",
+             pattern by hand (docs/log/gateware.md, ADC interface)",
         ),
         Sampling::Window { width_steps, phase_steps, period_steps, step_ns } => {
             let ns = |steps: u32| f64::from(steps) * step_ns;

@@ -28,7 +28,7 @@ pub enum SessionError {
     #[error(
         "the camera speaks protocol version {camera}, this program {}: update {}",
         version::Spoken,
-        if *.camera > version::CURRENT { "this program" } else { "the camera's firmware (nirspi flash)" }
+        if *.camera > version::CURRENT { "this program" } else { "the camera's firmware (nirspi camera flash)" }
     )]
     Version {
         /// The camera's version.
@@ -89,7 +89,8 @@ fn refusal_in_words(refusal: &Refusal) -> String {
         Refusal::Unsupported => "this board cannot do that".to_owned(),
         Refusal::Bus => "its FPGA does not answer".to_owned(),
         Refusal::Unknown => {
-            "its firmware does not know this command: update the firmware (nirspi flash)".to_owned()
+            "its firmware does not know this command: update the firmware (nirspi camera flash)"
+                .to_owned()
         }
     }
 }

@@ -1,4 +1,4 @@
-//! `nirspi bench enhance`: times the learned stages.
+//! `nirspi dev bench enhance`: times the learned stages.
 
 use super::RunArgs;
 use crate::networks::say_notes;
@@ -18,8 +18,8 @@ use std::process::ExitCode;
 /// a GPU takes for their transfer. The first run, in which a GPU compiles its kernels, is `first_ms`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi bench enhance --frames 256\n\
-    \x20 nirspi bench enhance --frames 4096 --backend cuda --precision f16")]
+    \x20 nirspi dev bench enhance --frames 256\n\
+    \x20 nirspi dev bench enhance --frames 4096 --backend cuda --precision f16")]
 pub struct Args {
     /// Steps along the bridge
     #[arg(long, value_name = "S", default_value = "1")]

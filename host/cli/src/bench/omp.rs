@@ -1,4 +1,4 @@
-//! `nirspi bench omp`: times sparse representations of many frames.
+//! `nirspi dev bench omp`: times sparse representations of many frames.
 
 use crate::report::{Overwrite, ReportArgs};
 use crate::{backend, print, provenance, refused};
@@ -18,9 +18,9 @@ use std::process::ExitCode;
 /// of `Y` with the dictionary prepared (`prepare_ms`: its Gram matrix).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi bench omp --measurements 512 --sparsity 64 --frames 256\n\
-    \x20 nirspi bench omp --frames 4096 --backend cuda\n\
-    \x20 nirspi bench omp --input problem.npz --out solution.npz")]
+    \x20 nirspi dev bench omp --measurements 512 --sparsity 64 --frames 256\n\
+    \x20 nirspi dev bench omp --frames 4096 --backend cuda\n\
+    \x20 nirspi dev bench omp --input problem.npz --out solution.npz")]
 pub struct Args {
     /// Problem file [default: a random problem: random rows of a Hadamard matrix measure a 32 x 32 image of cosines]
     #[arg(long, value_name = "NPZ", conflicts_with_all = ["measurements", "sparsity", "frames"])]

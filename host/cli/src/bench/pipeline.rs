@@ -1,4 +1,4 @@
-//! `nirspi bench pipeline`: times the path from measurements to enhanced images.
+//! `nirspi dev bench pipeline`: times the path from measurements to enhanced images.
 
 use super::RunArgs;
 use crate::networks::say_notes;
@@ -16,8 +16,8 @@ use std::process::ExitCode;
 /// the same work with images brought to the host in between is timed beside it. Times are for all frames, from measurements in memory to enhanced images in memory.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
-    \x20 nirspi bench pipeline --frames 256\n\
-    \x20 nirspi bench pipeline --frames 4096 --backend cuda --precision f16")]
+    \x20 nirspi dev bench pipeline --frames 256\n\
+    \x20 nirspi dev bench pipeline --frames 4096 --backend cuda --precision f16")]
 pub struct Args {
     /// Measurements of a frame, of 1024
     #[arg(long, value_name = "M", default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=1024))]

@@ -114,7 +114,7 @@ fn a_damaged_packet_in_a_recording_costs_one_frame() {
     assert_eq!(report["frames"]["corrupt"], 1, "{report}");
     assert!(report["warnings"][0].as_str().unwrap().contains("damaged"), "{report}");
     // The warning is on stderr, and --quiet does not hide it.
-    let export = ["export", "rec.mcap", "--to", "npz", "--out", "x.npz", "--quiet"];
+    let export = ["recording", "export", "rec.mcap", "--to", "npz", "--out", "x.npz", "--quiet"];
     let outcome = bench.run(&export);
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     let told = ["nirspi: warning: the recording is not whole: 599 received, 0 lost, 1 corrupt"];
@@ -217,7 +217,7 @@ fn a_pipe_or_a_device_is_refused_and_not_waited_for() {
     bench.run(&["reconstruct", "pipe.npz"]).failed(1, &["pipe.npz"]);
     bench.write("in.npy", &nirspi::files::npy::encode(&[32, 32], &[0.5; 1024]));
     for weights in ["pipe.safetensors", "/dev/zero"] {
-        let upscale = ["upscale", "in.npy", "--backend", "cpu", "--out", "out.npy"];
+        let upscale = ["dev", "upscale", "in.npy", "--backend", "cpu", "--out", "out.npy"];
         let outcome = bench.run(&[&upscale[..], &["--weights", weights]].concat());
         let outcome = outcome.failed(1, &[weights, "a device or pipe, expected a file"]);
         assert_eq!(outcome.stderr.matches("expected a file").count(), 1, "{outcome:?}");
@@ -234,9 +234,9 @@ fn a_pipe_or_a_device_is_no_calibration_description_or_bitstream() {
         let capture = ["capture", "--frames", "1", "--calibration", file, "--out", "rec.mcap"];
         bench.run(&capture).failed(1, &[file, "a device or pipe"]);
         bench
-            .run(&["gateware", file, "--camera", "virtual"])
+            .run(&["camera", "gateware", file, "--camera", "virtual"])
             .failed(1, &[file, "a device or pipe"]);
-        bench.run(&["camera-model", file]).failed(1, &[file, "a device or pipe"]);
+        bench.run(&["camera", "model", file]).failed(1, &[file, "a device or pipe"]);
     }
     assert!(!bench.path("rec.mcap").exists());
 }
@@ -250,12 +250,12 @@ fn a_pipe_or_a_device_is_no_table_of_numbers() {
         assert!(made.success());
     }
     for arguments in [
-        ["rain", "--uniformity", "pipe.csv"],
-        ["rain", "--uniformity", "/dev/zero"],
-        ["rain", "--drops", "pipe.csv"],
-        ["demo", "--weather", "pipe.csv"],
-        ["demo", "--order", "table:pipe.txt"],
-        ["reconstruct", "pipe.txt", "--method=hadamard"],
+        ["physics", "rig", "--volumes", "pipe.csv"],
+        ["physics", "rig", "--volumes", "/dev/zero"],
+        ["physics", "rain", "--drops", "pipe.csv"],
+        ["demo", "--light=1ms", "--weather", "pipe.csv"],
+        ["demo", "--light=1ms", "--order", "table:pipe.txt"],
+        ["reconstruct", "pipe.txt", "--method", "hadamard"],
     ] {
         let file = arguments.iter().find(|word| word.contains("pipe") || word.starts_with('/'));
         let file = file.unwrap().trim_start_matches("table:");

@@ -1,4 +1,4 @@
-//! `nirspi calibrate`, and what captures make of a scene too dim to show the ADC latency.
+//! `nirspi camera calibrate`, and what captures make of a scene too dim to show the ADC latency.
 
 use crate::bench::Bench;
 
@@ -11,10 +11,10 @@ fn a_dim_scene_needs_a_calibration_and_then_uses_it() {
     let capture = |more: &[&str]| {
         bench.run(&[&["capture", "--overwrite", "--out", "r.mcap"][..], &DIM, more].concat())
     };
-    capture(&[]).failed(1, &["too dim", "white sheet", "nirspi calibrate", "--adc-latency"]);
+    capture(&[]).failed(1, &["too dim", "white sheet", "nirspi camera calibrate", "--adc-latency"]);
     assert!(!bench.path("r.mcap").exists(), "nothing half-made stays");
 
-    let said = bench.run(&["calibrate"]).succeeded().stdout;
+    let said = bench.run(&["camera", "calibrate"]).succeeded().stdout;
     assert!(said.contains("ADC latency 6 clocks") && said.contains("kept in"), "{said}");
     let report = capture(&["--json"]).succeeded().json();
     assert_eq!((&report["calibrated"], &report["adc_latency_clocks"]), (&true.into(), &6.into()));
@@ -31,8 +31,10 @@ fn a_dim_scene_needs_a_calibration_and_then_uses_it() {
 #[test]
 fn a_calibration_goes_where_it_is_asked_to_go() {
     let bench = Bench::new();
-    let report =
-        bench.run(&["calibrate", "--calibration", "mine.json", "--json"]).succeeded().json();
+    let report = bench
+        .run(&["camera", "calibrate", "--calibration", "mine.json", "--json"])
+        .succeeded()
+        .json();
     assert_eq!(report["settling"]["adc_latency"], 6, "{report}");
     assert_eq!(bench.names(), ["mine.json"]);
     let used = ["capture", "--calibration", "mine.json", "--out", "r.mcap", "--json"];
@@ -57,15 +59,15 @@ fn a_flat_field_is_kept_for_its_camera_and_applied_to_its_pictures() {
     bench.write("lab.toml", UNEQUAL);
     let lab = ["--camera-model", "lab.toml"];
     bench
-        .run(&[&["calibrate", "--dark"][..], &lab].concat())
-        .failed(1, &["no flat field", "nirspi calibrate --white"]);
-    let white = ["calibrate", "--white", "--sweeps", "400"];
+        .run(&[&["camera", "calibrate", "--dark"][..], &lab].concat())
+        .failed(1, &["no flat field", "nirspi camera calibrate --white"]);
+    let white = ["camera", "calibrate", "--white", "--sweeps", "400"];
     let report = bench.run(&[&white[..], &lab, &["--json"]].concat()).succeeded().json();
     let flat = &report["flat_field"];
     assert_eq!(flat["dead_leds"], serde_json::json!([[3, 7]]), "{report}");
     let pattern = |when: &str| flat[when].as_f64().unwrap();
     assert!(pattern("pattern_after") < pattern("pattern_before") / 10.0, "{report}");
-    let dark = ["calibrate", "--dark", "--sweeps", "40", "--json"];
+    let dark = ["camera", "calibrate", "--dark", "--sweeps", "40", "--json"];
     let report = bench.run(&[&dark[..], &lab].concat()).succeeded().json();
     // Four standard deviations of 1024 pixels.
     assert!(report["dark_pixels"].as_u64().unwrap() <= 2, "{report}");

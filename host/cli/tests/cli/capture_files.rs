@@ -55,7 +55,7 @@ fn an_export_on_a_full_disk_is_one_line_and_leaves_nothing() {
     bench.run(&["capture", "--frames", "40", "--out", "rec.mcap"]).succeeded();
     for format in ["npz", "npy", "mcap", "apng"] {
         let out = format!("x.{format}");
-        let export = ["export", "rec.mcap", "--to", format, "--out", &out];
+        let export = ["recording", "export", "rec.mcap", "--to", format, "--out", &out];
         // 4 kB
         bench.run_limited("ulimit -f 8", &export).failed(1, &[&out, "File too large"]);
         assert_eq!(bench.names(), ["rec.mcap"], "{format}");
@@ -77,11 +77,11 @@ fn a_reader_that_closes_the_pipe_ends_no_recording() {
         .unwrap();
     drop((capture.stdout.take(), capture.stderr.take()));
     assert!(capture.wait().unwrap().success());
-    let report = bench.run(&["info", "rec.mcap", "--json"]).succeeded().json();
+    let report = bench.run(&["camera", "info", "rec.mcap", "--json"]).succeeded().json();
     assert_eq!(report["frames"]["received"], 200, "{report}");
     // The usual code, also if the output is closed at once.
     let mut info = std::process::Command::new(crate::bench::program())
-        .args(["info", "--json"])
+        .args(["camera", "info", "--json"])
         .arg(&out)
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
@@ -99,7 +99,7 @@ fn a_folder_takes_more_pictures_than_a_process_may_have_files_open() {
     let bench = Bench::new();
     let pixels: Vec<f32> = (0..COUNT * 32 * 32).map(|at| (at % 97) as f32 / 96.0).collect();
     bench.write("many.npy", &nirspi::files::npy::encode(&[COUNT, 32, 32], &pixels));
-    let upscale = ["upscale", "many.npy", "--backend", "cpu", "--out", "pictures"];
+    let upscale = ["dev", "upscale", "many.npy", "--backend", "cpu", "--out", "pictures"];
     bench.run_limited("ulimit -n 64", &upscale).succeeded();
     // With the list of the results.
     assert_eq!(std::fs::read_dir(bench.path("pictures")).unwrap().count(), COUNT + 1);

@@ -1,4 +1,4 @@
-//! `nirspi virtual` in one process, `nirspi capture` in another, and what becomes of each when the other goes.
+//! `nirspi dev virtual` in one process, `nirspi capture` in another, and what becomes of each when the other goes.
 
 use crate::bench::{Bench, Process};
 use std::io::{Read, Write};
@@ -6,7 +6,7 @@ use std::net::{TcpListener, TcpStream};
 
 /// Serves the virtual camera on a free port.
 fn serve(bench: &Bench, more: &[&str]) -> (Process, String) {
-    let mut server = bench.start(&[&["virtual", "--listen", "127.0.0.1:0"], more].concat());
+    let mut server = bench.start(&[&["dev", "virtual", "--listen", "127.0.0.1:0"], more].concat());
     let line = server.says("virtual camera on tcp:");
     let address = line.split_whitespace().find_map(|word| word.strip_prefix("tcp:")).unwrap();
     (server, format!("tcp:{}", address.trim_end_matches(':')))
@@ -39,7 +39,7 @@ fn a_thousand_frames_are_captured_recorded_and_reconstructed() {
 #[test]
 fn a_camera_that_other_machines_reach_warns_that_it_has_no_token() {
     let bench = Bench::new();
-    let mut open = bench.start(&["virtual", "--listen", "0.0.0.0:0", "-q"]);
+    let mut open = bench.start(&["dev", "virtual", "--listen", "0.0.0.0:0", "-q"]);
     open.remarks(
         "nirspi: warning: --listen 0.0.0.0:0: every machine in this network can use this camera",
     );
@@ -191,7 +191,7 @@ fn devices_lists_the_camera_that_answers_and_says_why_another_does_not() {
     let (_server, camera) = serve(&bench, &["--seed", "42"]);
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
     let address = camera.strip_prefix("tcp:").unwrap();
-    let outcome = bench.run(&["devices", "--json", "--tcp", address, "--tcp", &closed]);
+    let outcome = bench.run(&["camera", "devices", "--json", "--tcp", address, "--tcp", &closed]);
     assert_eq!(outcome.code, Some(1), "{outcome:?}");
     let devices = outcome.json();
     assert_eq!(devices[0]["camera"], "virtual");
@@ -392,6 +392,6 @@ fn a_million_frames_over_an_unruly_link_are_each_accounted_for_once() {
 
 /// A counter of the recording, by `info`.
 fn frames_of(bench: &Bench, counter: &str) -> u64 {
-    let report = bench.run(&["info", "rec.mcap", "--json"]).json();
+    let report = bench.run(&["camera", "info", "rec.mcap", "--json"]).json();
     report["frames"][counter].as_u64().unwrap()
 }

@@ -362,6 +362,6 @@ fn a_camera_that_never_gets_on_with_a_bitstream_is_given_up() {
     let bench = Bench::new();
     let bitstream: Vec<u8> = [0xFF, 0x00].into_iter().chain([0x5A; 20_000]).collect();
     bench.write("top.bin", &bitstream);
-    let gateware = ["gateware", "top.bin", "--camera", &camera(HONEST, || {})];
+    let gateware = ["camera", "gateware", "top.bin", "--camera", &camera(HONEST, || {})];
     bench.run(&gateware).failed(1, &["lost its place at byte 0"]);
 }

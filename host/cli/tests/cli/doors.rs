@@ -18,7 +18,9 @@ fn one_recording_gives_one_picture_through_every_door() {
     let bench = Bench::new();
     bench.write("lab.toml", UNEQUAL);
     let lab = ["--camera-model", "lab.toml"];
-    bench.run(&[&["calibrate", "--white", "--sweeps", "200"][..], &lab].concat()).succeeded();
+    bench
+        .run(&[&["camera", "calibrate", "--white", "--sweeps", "200"][..], &lab].concat())
+        .succeeded();
     let capture = ["capture", "--frames", "40", "--out", "rec.mcap", "--picture", "seen"];
     done(&bench, &[&capture[..], &lab].concat());
     done(&bench, &["reconstruct", "rec.mcap", "--enhance", "--out", "rec"]);

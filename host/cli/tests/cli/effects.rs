@@ -27,7 +27,7 @@ fn a_capture_is_of_the_setup_that_was_asked_for() {
         .chain(setup.split_whitespace())
         .collect();
     bench.run(&capture).succeeded();
-    let info = bench.run(&["info", "rec.mcap", "--json"]).succeeded().json();
+    let info = bench.run(&["camera", "info", "rec.mcap", "--json"]).succeeded().json();
     for (name, value) in [
         ("order", serde_json::json!("natural")),
         ("patterns", 256.into()),
@@ -50,7 +50,7 @@ fn with_strict_a_warning_is_exit_code_1_and_the_result_is_there() {
     bytes[middle] ^= 0x55;
     bench.write("rec.mcap", &bytes);
     let export = |out: &str, more: &[&str]| {
-        let export = ["export", "rec.mcap", "--to", "npz", "--out", out];
+        let export = ["recording", "export", "rec.mcap", "--to", "npz", "--out", out];
         bench.run(&[&export[..], more].concat())
     };
     let warned = export("a.npz", &[]).succeeded();
@@ -64,7 +64,8 @@ fn with_strict_a_warning_is_exit_code_1_and_the_result_is_there() {
 }
 
 fn serve(bench: &Bench, more: &[&str]) -> (Process, CameraAddress) {
-    let virtual_camera = ["virtual", "--listen", "127.0.0.1:0", "--once", "--precompute", "4"];
+    let virtual_camera =
+        ["dev", "virtual", "--listen", "127.0.0.1:0", "--once", "--precompute", "4"];
     let mut server = bench.start(&[&virtual_camera[..], more].concat());
     let line = server.says("virtual camera on tcp:");
     let address = line.split_whitespace().find(|word| word.starts_with("tcp:")).unwrap();
@@ -123,7 +124,7 @@ fn an_emulated_board_finds_the_fpga_behind_its_tunnel() {
     let bench = Bench::new();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
-    let mut fpga = bench.start(&["virtual", "--tunnel", &address]);
+    let mut fpga = bench.start(&["dev", "virtual", "--tunnel", &address]);
     fpga.says("FPGA behind ");
     let (mut board, _) = listener.accept().unwrap();
     let identity = Register::Identity.address();
@@ -137,7 +138,9 @@ fn an_emulated_board_finds_the_fpga_behind_its_tunnel() {
     drop(board);
     fpga.says("the emulator disconnected");
     drop(listener);
-    bench.run(&["virtual", "--tunnel", &address]).failed(1, &[&address, "no emulator there"]);
+    bench
+        .run(&["dev", "virtual", "--tunnel", &address])
+        .failed(1, &[&address, "no emulator there"]);
 }
 
 /// At 0.5 m/s a letter of 43 mm goes on by 6.7 pixels in 20 ms.

@@ -34,7 +34,7 @@ fn only_the_wish_of_the_user_ends_a_capture_well() {
         assert_eq!(report["ended"], ended);
         assert_eq!(report["complete"], code == 0, "{report}");
         // The file says it too.
-        let info = bench.run(&["info", "rec.mcap", "--json"]).stdout;
+        let info = bench.run(&["camera", "info", "rec.mcap", "--json"]).stdout;
         assert_eq!(info.contains(&format!("SIG{signal}")), code == 1, "{signal}: {info}");
     }
 }

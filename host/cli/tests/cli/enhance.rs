@@ -1,4 +1,4 @@
-//! `nirspi upscale`, `deblur` and `enhance`. That the networks compute what they should is tested in `nirspi-nets`.
+//! `nirspi dev upscale`, `deblur` and `enhance`. That the networks compute what they should is tested in `nirspi-nets`.
 
 use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
@@ -84,7 +84,7 @@ fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
 fn a_single_image_stays_one_and_bytes_are_grey_levels() {
     let bench = Bench::new();
     bench.write("in.npy", &npy::encode(&[32, 32], &bar(32)));
-    bench.run(&["upscale", "in.npy", "--out", "out.npy"]).succeeded();
+    bench.run(&["dev", "upscale", "in.npy", "--out", "out.npy"]).succeeded();
     assert_eq!(bench.pixels("out.npy").len(), 64 * 64);
     // The same as 8-bit levels, in NumPy's format by hand, and as a PNG.
     let levels: Vec<u8> = bar(32).iter().map(|v| (v * 255.0).round() as u8).collect();
@@ -96,8 +96,8 @@ fn a_single_image_stays_one_and_bytes_are_grey_levels() {
     file.extend(&levels);
     bench.write("bytes.npy", &file);
     bench.write("in.png", &encode_grey(32, 32, &bar(32), &provenance()));
-    bench.run(&["upscale", "bytes.npy", "--out", "from_bytes.npy"]).succeeded();
-    bench.run(&["upscale", "in.png", "--out", "from_png.npy"]).succeeded();
+    bench.run(&["dev", "upscale", "bytes.npy", "--out", "from_bytes.npy"]).succeeded();
+    bench.run(&["dev", "upscale", "in.png", "--out", "from_png.npy"]).succeeded();
     assert_eq!(bench.pixels("from_bytes.npy"), bench.pixels("from_png.npy"));
     let exact = bench.pixels("out.npy");
     let close = |(a, b): (&f32, &f32)| (a - b).abs() < 0.02;
@@ -177,7 +177,15 @@ fn weights_of_another_network_are_refused() {
     let classifier = classifier.to_bytes(nirspi_nets::weights::Precision::Half).unwrap();
     bench.write("classifier.safetensors", &classifier);
     bench
-        .run(&["upscale", "in.npy", "--weights", "classifier.safetensors", "--out", "out.npy"])
+        .run(&[
+            "dev",
+            "upscale",
+            "in.npy",
+            "--weights",
+            "classifier.safetensors",
+            "--out",
+            "out.npy",
+        ])
         .failed(2, &["classifier.safetensors", "network classifier", "expected fsrcnn"]);
 }
 
@@ -186,7 +194,7 @@ fn no_result_replaces_its_own_input_nor_another_file_unasked() {
     let bench = Bench::new();
     let input = npy::encode(&[32, 32], &bar(32));
     bench.write("in.npy", &input);
-    let deblur = |more: &[&str]| bench.run(&[&["upscale", "in.npy"][..], more].concat());
+    let deblur = |more: &[&str]| bench.run(&[&["dev", "upscale", "in.npy"][..], more].concat());
     deblur(&["--out", "in.npy"]).failed(1, &["in.npy: is there already", "--overwrite"]);
     let own = ["in.npy: the result is made of this file, expected another name for it"];
     deblur(&["--out", "in.npy", "--overwrite"]).failed(1, &own);
@@ -237,7 +245,7 @@ fn a_reconstruction_is_enhanced_if_its_size_allows() {
 #[test]
 fn the_time_of_enhancing_is_reported_with_its_parts() {
     let bench = Bench::new();
-    let args = ["bench", "enhance", "--frames", "2", "--repeats", "1", "--backend", "cpu"];
+    let args = ["dev", "bench", "enhance", "--frames", "2", "--repeats", "1", "--backend", "cpu"];
     let report = bench.run(&args).succeeded().json();
     assert_eq!((&report["device"], &report["frames"]), (&"CPU".into(), &2.into()), "{report}");
     let ms = |part: &serde_json::Value| part["median_ms"].as_f64().unwrap();
@@ -251,7 +259,7 @@ fn the_whole_of_the_pipeline_is_timed_and_reconstructs_what_was_measured() {
     let bench = Bench::new();
     let time = |backend| {
         let few = ["--frames", "2", "--sparsity", "32", "--repeats", "1"];
-        bench.run(&[&["bench", "pipeline", "--backend", backend], &few[..]].concat())
+        bench.run(&[&["dev", "bench", "pipeline", "--backend", backend], &few[..]].concat())
     };
     let report = time("cpu").succeeded().json();
     assert_eq!((&report["device"], &report["frames"]), (&"CPU".into(), &2.into()), "{report}");

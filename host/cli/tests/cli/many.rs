@@ -62,7 +62,7 @@ fn a_file_of_several_and_a_recording_give_each_measurement_or_their_sum() {
     let bench = Bench::new();
     bench.run(&["capture", "--frames", "3", "--sampling", "10%", "--out", "rec.mcap"]).succeeded();
     bench.run(&["reconstruct", "rec.mcap", "--out", "sum"]).succeeded();
-    bench.run(&["export", "rec.mcap", "--to", "npz", "--out", "rec.npz"]).succeeded();
+    bench.run(&["recording", "export", "rec.mcap", "--to", "npz", "--out", "rec.npz"]).succeeded();
     bench.run(&["reconstruct", "rec.mcap", "--index", "all", "--out", "each"]).succeeded();
     let sum = bench.pixels("sum/image.npy");
     bench.run(&["reconstruct", "rec.mcap", "rec.mcap", "--out", "sums"]).succeeded();

@@ -11,10 +11,12 @@ fn two_stacks_are_compared_image_by_image() {
     test[256..].iter_mut().for_each(|pixel| *pixel += 0.05);
     bench.write("a.npy", &npy::encode(&[2, 16, 16], &reference));
     bench.write("b.npy", &npy::encode(&[2, 16, 16], &test));
-    let report = bench.run(&["metrics", "a.npy", "b.npy"]).succeeded().json();
+    let report = bench.run(&["metrics", "a.npy", "b.npy", "--json"]).succeeded().json();
     // The first is identical, which has no finite PSNR; the second is off by 0.05 everywhere: 26.02 dB.
     assert!(report["each"][0]["psnr_db"].is_null() && report["each"][0]["ssim"] == 1.0, "{report}");
     assert!((report["each"][1]["psnr_db"].as_f64().unwrap() - 26.0206).abs() < 1e-3, "{report}");
+    let said = bench.run(&["metrics", "a.npy", "b.npy"]).succeeded().stdout;
+    assert!(said.starts_with("2 images of 16 x 16\nPSNR 26.02 dB, SSIM 0.9"), "{said}");
 }
 
 #[test]
@@ -25,11 +27,15 @@ fn pictures_with_labels_are_compared_by_the_images_in_them() {
     for (out, share) in [("all", "1"), ("part", "0.5")] {
         bench.run(&["reconstruct", "in.npz", "--sampling", share, "--out", out]).succeeded();
     }
-    let compare = |test: &str| bench.run(&["metrics", "all/image.png", test]).succeeded().json();
+    let compare =
+        |test: &str| bench.run(&["metrics", "all/image.png", test, "--json"]).succeeded().json();
     assert_eq!(compare("all/image.png")["mean_ssim"], 1.0);
     let part = compare("part/image.png")["mean_ssim"].as_f64().unwrap();
     // The labels are equal in both pictures, so the comparison leaves them out.
-    let range = bench.run(&["metrics", "all", "part", "--align", "gain-offset"]).succeeded().json();
+    let range = bench
+        .run(&["metrics", "all", "part", "--align", "gain-offset", "--json"])
+        .succeeded()
+        .json();
     assert!((part - range["mean_ssim"].as_f64().unwrap()).abs() < 0.1, "{part} {range}");
 }
 
@@ -45,9 +51,11 @@ fn sets_of_characters_have_a_distance_of_their_own_name() {
     bench.write("a.npy", &stripes(0));
     bench.write("b.npy", &stripes(4));
     bench.write("labels.npy", &npy::encode(&[3], &[10.0, 11.0, 61.0_f64]));
-    let far =
-        bench.run(&["metrics", "a.npy", "b.npy", "--labels", "labels.npy"]).succeeded().json();
-    let near = bench.run(&["metrics", "a.npy", "a.npy"]).succeeded().json();
+    let far = bench
+        .run(&["metrics", "a.npy", "b.npy", "--labels", "labels.npy", "--json"])
+        .succeeded()
+        .json();
+    let near = bench.run(&["metrics", "a.npy", "a.npy", "--json"]).succeeded().json();
     let distance =
         |report: &serde_json::Value| report["frechet_character_distance"].as_f64().unwrap();
     assert!(distance(&near) < 1e-3 && distance(&far) > distance(&near), "{near} {far}");
@@ -59,7 +67,7 @@ fn sets_of_characters_have_a_distance_of_their_own_name() {
 fn a_figure_that_cannot_be_had_says_why() {
     let bench = Bench::new();
     bench.write("small.npy", &npy::encode(&[16, 16], &[0.5; 256]));
-    let report = bench.run(&["metrics", "small.npy", "small.npy"]).succeeded().json();
+    let report = bench.run(&["metrics", "small.npy", "small.npy", "--json"]).succeeded().json();
     assert!(report["frechet_character_distance"].is_null());
     assert!(report["notes"][0].as_str().unwrap().contains("64 x 64, not 16 x 16"), "{report}");
     bench.write("one.npy", &stripes(0));

@@ -91,7 +91,8 @@ fn the_leak_from_pattern_to_pattern_stays_if_the_user_says_so() {
     assert_ne!(corrected, kept);
     // An exported recording is what `reconstruct` sees.
     let exported = |more: &[&str]| {
-        let all = ["export", RECORDING, "--to", "npz", "--out", "out.npz", "--overwrite"];
+        let all =
+            ["recording", "export", RECORDING, "--to", "npz", "--out", "out.npz", "--overwrite"];
         bench.run(&[&all, more].concat()).succeeded();
         image(&bench, "out.npz", &[])
     };
@@ -104,13 +105,13 @@ fn a_damaged_recording_is_recovered_into_the_named_file_alone() {
     let bench = Bench::new();
     let whole = std::fs::read(RECORDING).unwrap();
     bench.write("cut.mcap", &whole[..whole.len() * 3 / 4]);
-    let recover = ["recover", "cut.mcap", "--out", "new.mcap"];
+    let recover = ["recording", "recover", "cut.mcap", "--out", "new.mcap"];
     let said = report(&bench, &recover);
     assert_eq!(said["damage"], "the file ends early", "{said}");
     let received = said["frames"]["received"].as_u64().unwrap();
     assert!((1..12).contains(&received), "{said}");
     let new = std::fs::read(bench.path("new.mcap")).unwrap();
-    let info = bench.run(&["info", "new.mcap"]).succeeded().stdout;
+    let info = bench.run(&["camera", "info", "new.mcap"]).succeeded().stdout;
     assert!(info.contains(&format!("{received} received")) && info.contains("recovered"), "{info}");
     bench.run(&recover).failed(1, &["new.mcap", "--overwrite"]);
     bench.write("new.mcap", b"another file");
@@ -137,9 +138,10 @@ fn pictures_of_another_size_are_cropped_and_resized_on_demand() {
     let grey: Vec<f32> = (0..100 * 80).map(|at| (at % 100 / 10 % 2) as f32).collect();
     bench.write("in.png", &encode_grey(100, 80, &grey, &provenance()));
     for (command, more) in
-        [("upscale", &[][..]), ("deblur", &["--model", "wiener"]), ("enhance", &[])]
+        [("dev upscale", &[][..]), ("deblur", &["--model", "wiener"]), ("enhance", &[])]
     {
-        let all = [&[command, "in.png", "--out", "out.npy", "--overwrite"], more].concat();
+        let words: Vec<&str> = command.split(' ').collect();
+        let all = [&words, &["in.png", "--out", "out.npy", "--overwrite"][..], more].concat();
         bench.run(&all).failed(1, &["in.png", "80 x 100", "--resize"]);
         bench.run(&[&all[..], &["--resize"]].concat()).succeeded();
         assert_eq!(bench.pixels("out.npy").len(), 64 * 64, "{command}");
@@ -160,7 +162,8 @@ fn without_agreement_with_the_readings_the_network_alone_decides() {
     };
     assert_ne!(sharp(&[]), sharp(&["--no-consistency"]));
     let told = |more: &[&str]| {
-        let all = ["bench", "pipeline", "--frames", "1", "--repeats", "1", "--backend", "cpu"];
+        let all =
+            ["dev", "bench", "pipeline", "--frames", "1", "--repeats", "1", "--backend", "cpu"];
         report(&bench, &[&all, more].concat())
     };
     let few = told(&["--measurements", "64", "--sparsity", "4", "--no-consistency"]);
@@ -176,7 +179,7 @@ fn without_agreement_with_the_readings_the_network_alone_decides() {
 
 /// The atoms that `bench omp` has chosen.
 fn atoms(bench: &Bench, more: &[&str]) -> Vec<u8> {
-    let all = ["bench", "omp", "--out", "solution.npz", "--overwrite", "--repeats", "1"];
+    let all = ["dev", "bench", "omp", "--out", "solution.npz", "--overwrite", "--repeats", "1"];
     bench.run(&[&all, more].concat()).succeeded();
     let file = std::fs::File::open(bench.path("solution.npz")).unwrap();
     let mut archive = zip::ZipArchive::new(file).unwrap();
@@ -213,17 +216,17 @@ fn less_light_or_a_higher_demand_is_a_shorter_range() {
         assert!(rows.iter().all(|row| row["exposure_us"] == 25.0), "{said}");
         rows.iter().map(|row| row["physics_m"].as_f64().unwrap()).collect()
     };
-    let all = ranges(&["range"], &[]);
+    let all = ranges(&["physics", "range"], &[]);
     // `eval table2` is the same command.
     for less in [
-        ranges(&["range"], &["--reflectance", "0.2"]),
+        ranges(&["physics", "range"], &["--reflectance", "0.2"]),
         ranges(&["eval", "table2"], &["--snr", "5"]),
-        ranges(&["range"], &["--camera-model", "fga015"]),
+        ranges(&["physics", "range"], &["--camera-model", "fga015"]),
     ] {
         assert!(all.len() == 2 && all.iter().zip(&less).all(|(all, less)| less != all), "{less:?}");
     }
     let budget = |more: &[&str]| {
-        let all = ["rain", "--budget", "--wavelengths-nm", "1550", "--drops", "mono:2"];
+        let all = ["physics", "budget", "--wavelengths-nm", "1550", "--drops", "mono:2"];
         report(&bench, &[&all, more].concat())["snr_per_pixel"].as_f64().unwrap()
     };
     let snr = budget(&[]);
@@ -243,7 +246,7 @@ fn simulated_measurements_are_those_of_their_seed_and_replace_no_file_unasked() 
     bench.run(&["example", "wing", "--out", "wing.npz"]).failed(1, &["wing.npz", "--overwrite"]);
     assert_ne!(wing(&["--seed", "7", "--overwrite"]), first);
 
-    let pairs = ["pairs", "--count", "1", "--out", "pairs.npz"];
+    let pairs = ["dev", "pairs", "--count", "1", "--out", "pairs.npz"];
     bench.run(&pairs).succeeded();
     let paper = std::fs::read(bench.path("pairs.npz")).unwrap().len();
     bench.run(&pairs).failed(1, &["pairs.npz", "--overwrite"]);
@@ -256,6 +259,6 @@ fn simulated_measurements_are_those_of_their_seed_and_replace_no_file_unasked() 
 #[test]
 fn a_self_test_looks_at_the_scene_that_is_named() {
     let bench = Bench::new();
-    let dark = bench.run(&["selftest", "--scene", "black", "--json"]);
+    let dark = bench.run(&["camera", "selftest", "--scene", "black", "--json"]);
     assert_eq!((dark.code, &dark.json()["passed"]), (Some(1), &false.into()), "{dark:?}");
 }

@@ -1,4 +1,4 @@
-//! `nirspi completions` and `nirspi man`.
+//! `nirspi dev completions` and `nirspi dev man`.
 
 use crate::bench::Bench;
 use std::process::Command;
@@ -7,10 +7,10 @@ use std::process::Command;
 fn every_shell_gets_a_script_that_knows_the_commands() {
     let bench = Bench::new();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
-        let script = bench.run(&["completions", shell]).succeeded().stdout;
+        let script = bench.run(&["dev", "completions", shell]).succeeded().stdout;
         assert!(script.contains("reconstruct") && script.contains("capture"), "{shell}");
     }
-    bench.run(&["completions", "cmd"]).failed(2, &["'cmd'", "bash"]);
+    bench.run(&["dev", "completions", "cmd"]).failed(2, &["'cmd'", "bash"]);
 }
 
 /// What bash itself offers after these words: the completions of the script, or files.
@@ -21,7 +21,7 @@ fn bash_offers_files_where_a_file_can_stand() {
         return;
     }
     let bench = Bench::new();
-    let script = bench.run(&["completions", "bash"]).succeeded().stdout;
+    let script = bench.run(&["dev", "completions", "bash"]).succeeded().stdout;
     bench.write("script", script.as_bytes());
     let offers = |words: &[&str]| {
         let ask = "source ./script; COMP_WORDS=(\"$@\"); COMP_CWORD=$(($# - 1)); \
@@ -44,18 +44,18 @@ fn bash_offers_files_where_a_file_can_stand() {
     assert_eq!(offers(&["reconstruct", "--matr"]), ["--matrix", "--matrix-field"]);
     assert!(offers(&["reconstruct", "--method", "t"]).contains(&"tikhonov".to_owned()));
     assert_eq!(offers(&["recons"]), ["reconstruct"]);
-    assert!(offers(&["bench", ""]).contains(&"omp".to_owned()));
-    assert!(offers(&["completions", ""]).contains(&"zsh".to_owned()));
+    assert!(offers(&["dev", "bench", ""]).contains(&"omp".to_owned()));
+    assert!(offers(&["dev", "completions", ""]).contains(&"zsh".to_owned()));
 }
 
 #[test]
 fn every_command_has_a_manual_page() {
     let bench = Bench::new();
     bench.write("file", b"");
-    bench.run(&["man", "file"]).failed(1, &["file", "a folder"]);
-    bench.run(&["man", "man1"]).succeeded();
+    bench.run(&["dev", "man", "file"]).failed(1, &["file", "a folder"]);
+    bench.run(&["dev", "man", "man1"]).succeeded();
     let page = |name: &str| std::fs::read_to_string(bench.path("man1").join(name)).unwrap();
     assert!(page("nirspi.1").contains("single\\-pixel camera"));
     assert!(page("nirspi-reconstruct.1").contains(".TH nirspi-reconstruct 1"));
-    assert!(page("nirspi-bench-omp.1").contains("bench omp"));
+    assert!(page("nirspi-dev-bench-omp.1").contains("bench omp"));
 }

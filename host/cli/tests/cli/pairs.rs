@@ -1,4 +1,4 @@
-//! `nirspi pairs`: scenes and the virtual camera's pictures of them, to train networks on.
+//! `nirspi dev pairs`: scenes and the virtual camera's pictures of them, to train networks on.
 
 use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
@@ -26,7 +26,7 @@ fn arrays(bench: &Bench, path: &str) -> Vec<(String, Vec<u8>)> {
 fn pairs_are_as_many_as_asked_and_those_of_their_seed() {
     let bench = Bench::new();
     let pairs = |seed: &str, out: &str| {
-        let args = ["pairs", "--count", "3", "--seed", seed, "--out", out, "--json"];
+        let args = ["dev", "pairs", "--count", "3", "--seed", seed, "--out", out, "--json"];
         let report = bench.run(&args).succeeded().json();
         assert_eq!((&report["pairs"], &report["simulated"]), (&3.into(), &true.into()));
         arrays(&bench, out)
@@ -56,7 +56,7 @@ fn characters_of_chars74ks_folder_become_stacks_to_which_the_pairs_refer() {
         std::fs::create_dir_all(bench.path(&file).parent().unwrap()).unwrap();
         bench.write(&file, &encode_grey(64, 64, &page, &provenance()));
     }
-    let args = ["pairs", "--data", "chars74k", "--characters", "letters", "--shapes", "0"];
+    let args = ["dev", "pairs", "--data", "chars74k", "--characters", "letters", "--shapes", "0"];
     let more = ["--count", "8", "--out", "pairs.npz", "--json"];
     let report = bench.run(&[&args[..], &more].concat()).succeeded().json();
     assert_eq!(report["data"]["stacks"][1]["stack"], "hnd", "{report}");
@@ -80,7 +80,7 @@ fn characters_of_chars74ks_folder_become_stacks_to_which_the_pairs_refer() {
     // The folder is new, and there must be characters to write.
     let again = [&args[..], &["--out", "other.npz"]].concat();
     bench.run(&again).failed(1, &["letters", "the name of a new folder"]);
-    let none = ["pairs", "--characters", "none", "--out", "other.npz"];
+    let none = ["dev", "pairs", "--characters", "none", "--out", "other.npz"];
     bench.run(&none).failed(2, &["--data <PATH>|--fonts <DIR>"]);
     assert!(!bench.path("other.npz").exists() && !bench.path("none").exists());
 }

@@ -116,14 +116,14 @@ fn pictures_and_reports_of_a_recording_name_its_camera() {
     for form in ["npz", "npy", "csv", "mcap", "apng"] {
         let out = format!("exported/{form}/rec.{form}");
         fs::create_dir_all(bench.path(&out).parent().unwrap()).unwrap();
-        run(&bench, &["export", "rec.mcap", "--to", form, "--out", &out]).succeeded();
+        run(&bench, &["recording", "export", "rec.mcap", "--to", form, "--out", &out]).succeeded();
     }
     for form in ["npz", "npy", "apng"] {
-        all_are_signed(&bench, &format!("exported/{form}"), 1, SIMULATED, "export");
+        all_are_signed(&bench, &format!("exported/{form}"), 1, SIMULATED, "recording export");
     }
     let table = fs::read_to_string(bench.path("exported/csv/rec.csv")).unwrap();
     let line = table.lines().find_map(|line| line.strip_prefix("# provenance: ")).unwrap();
-    is_signed("csv", &serde_json::from_str(line).unwrap(), SIMULATED, "export");
+    is_signed("csv", &serde_json::from_str(line).unwrap(), SIMULATED, "recording export");
     let bytes = fs::read(bench.path("exported/mcap/rec.mcap")).unwrap();
     let text = String::from_utf8_lossy(&bytes);
     let (key, json) = (text.find("nirspi-provenance").unwrap(), "\"origin\":\"simulated\"");
@@ -168,10 +168,12 @@ fn enhanced_images_keep_the_origin_that_their_pictures_state() {
     all_are_signed(&bench, "sharp", 2, Origin::Measured, "deblur");
     let said = says(deblur("plain.npy", "p.npy"), Origin::Unknown, "deblur");
     assert_eq!(said.taken.file.as_deref(), Some("plain.npy"));
-    for name in ["enhance", "upscale"] {
+    for name in ["enhance", "dev upscale"] {
         let out = format!("{name}/s.npy");
         fs::create_dir_all(bench.path(name)).unwrap();
-        let arguments = [name, "small.npy", "--backend", "cpu", "--out", &out, "--json"];
+        let words = name.split(' ').collect::<Vec<_>>();
+        let arguments =
+            [&words[..], &["small.npy", "--backend", "cpu", "--out", &out, "--json"]].concat();
         says(run(&bench, &arguments), Origin::Unknown, name);
         all_are_signed(&bench, name, 1, Origin::Unknown, name);
     }
@@ -205,7 +207,13 @@ fn readings_of_others_are_named_by_their_file() {
 fn tables_charts_and_times_are_signed() {
     let bench = Bench::new();
     for (arguments, name, folder, count, origin) in [
-        (&["range", "--out", "range", "--json"][..], "range", "range", 5, SIMULATED),
+        (
+            &["physics", "range", "--out", "range", "--json"][..],
+            "physics range",
+            "range",
+            5,
+            SIMULATED,
+        ),
         (
             &["eval", "table1", "--repeats", "10", "--out", "table", "--json"],
             "eval table1",
@@ -217,14 +225,15 @@ fn tables_charts_and_times_are_signed() {
         says(run(&bench, arguments), origin, name);
         all_are_signed(&bench, folder, count, origin, name);
     }
-    let timed = ["bench", "enhance", "--frames", "1", "--repeats", "1", "--backend", "cpu"];
-    says(run(&bench, &timed), Origin::Computed, "bench enhance");
+    let timed = ["dev", "bench", "enhance", "--frames", "1", "--repeats", "1", "--backend", "cpu"];
+    says(run(&bench, &timed), Origin::Computed, "dev bench enhance");
     bench.write("a.npy", &encode(&[16, 16], &[0.5_f32; 256]));
-    let metrics = ["metrics", "a.npy", "a.npy"];
+    let metrics = ["metrics", "a.npy", "a.npy", "--json"];
     let said = run(&bench, &metrics);
     says(said, Origin::Computed, "metrics");
     for name in ["calibrate", "selftest"] {
-        let said = says(run(&bench, &[name, "--json"]), SIMULATED, name);
+        let said = run(&bench, &["camera", name, "--json"]);
+        let said = says(said, SIMULATED, &format!("camera {name}"));
         assert_eq!(said.taken.camera.unwrap().serial, "virtual-1");
     }
     run(&bench, &["example", "wing", "--out", "wing.npz"]).succeeded();

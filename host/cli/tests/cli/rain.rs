@@ -1,11 +1,12 @@
-//! `nirspi rain`, `range` and `eval`: what they print, and how they refuse.
+//! `nirspi physics rain`, `range` and `eval`: what they print, and how they refuse.
 
 use crate::bench::Bench;
 
 #[test]
 fn one_sphere_is_told_as_json() {
     let bench = Bench::new();
-    let arguments = ["rain", "--mie", "--x", "100", "--m-re", "1.33", "--m-im", "1e-4", "--json"];
+    let arguments =
+        ["physics", "sphere", "--x", "100", "--m-re", "1.33", "--m-im", "1e-4", "--json"];
     let report = bench.run(&arguments).succeeded().json();
     // miepython 3.3.0: 2.1007189, 2.0589971, 0.8738868
     for (name, expected) in [("qext", 2.100_718_9), ("qsca", 2.058_997_1), ("g", 0.873_886_8)] {
@@ -17,16 +18,16 @@ fn one_sphere_is_told_as_json() {
 #[test]
 fn rain_is_told_at_the_wavelengths_asked_for() {
     let bench = Bench::new();
-    let report = bench.run(&["rain", "--drops", "mono:2", "--json"]).succeeded().json();
+    let report = bench.run(&["physics", "rain", "--drops", "mono:2", "--json"]).succeeded().json();
     let wavelengths = report["wavelengths"].as_array().unwrap();
     let nm: Vec<f64> = wavelengths.iter().map(|w| w["wavelength_nm"].as_f64().unwrap()).collect();
     assert_eq!(nm, [550.0, 850.0, 1550.0]);
     assert!(wavelengths.iter().all(|w| w["extinction_per_m"].as_f64().unwrap() > 3.5e-4));
-    let text = bench.run(&["rain", "--budget"]).succeeded().stdout;
+    let text = bench.run(&["physics", "budget"]).succeeded().stdout;
     for term in ["LED power", "dark current", "shot noise", "quantisation", "SNR, one pixel"] {
         assert!(text.contains(term), "{term}: {text}");
     }
-    let budget = bench.run(&["rain", "--budget", "--json"]).succeeded().json();
+    let budget = bench.run(&["physics", "budget", "--json"]).succeeded().json();
     let daylight = budget["daylight"].as_array().unwrap();
     let watts: Vec<f64> =
         daylight.iter().map(|d| d["on_target_w_per_m2"].as_f64().unwrap()).collect();
@@ -41,51 +42,57 @@ fn rain_is_told_at_the_wavelengths_asked_for() {
 fn uniformity_is_christiansens_of_the_last_column() {
     let bench = Bench::new();
     bench.write("volumes.csv", b"place,ml\n1,8\n2,12\n3,9\n4,11\n");
-    let report = bench.run(&["rain", "--uniformity", "volumes.csv", "--json"]).succeeded().json();
+    let report =
+        bench.run(&["physics", "rig", "--volumes", "volumes.csv", "--json"]).succeeded().json();
     assert!((report["uniformity_percent"].as_f64().unwrap() - 85.0).abs() < 1e-9, "{report}");
     bench.write("bad.csv", b"place,ml\n1,8\n2,wet\n");
-    bench.run(&["rain", "--uniformity", "bad.csv"]).failed(1, &["bad.csv", "line 3", "a number"]);
+    bench
+        .run(&["physics", "rig", "--volumes", "bad.csv"])
+        .failed(1, &["bad.csv", "line 3", "a number"]);
     // No heading, and places that are no numbers: the first volume counts.
     bench.write("named.csv", b"left,8\nmiddle,12\nright,9\nfront,11\n");
-    let report = bench.run(&["rain", "--uniformity", "named.csv", "--json"]).succeeded().json();
+    let report =
+        bench.run(&["physics", "rig", "--volumes", "named.csv", "--json"]).succeeded().json();
     assert_eq!(report["containers"], 4, "{report}");
     assert!((report["uniformity_percent"].as_f64().unwrap() - 85.0).abs() < 1e-9, "{report}");
-    bench.run(&["rain", "--uniformity", "none.csv"]).failed(1, &["none.csv"]);
+    bench.run(&["physics", "rig", "--volumes", "none.csv"]).failed(1, &["none.csv"]);
 }
 
 #[test]
 fn rain_that_cannot_be_is_refused_with_its_range() {
     let bench = Bench::new();
     let mistakes: &[(&[&str], &[&str])] = &[
-        (&["--rate-mm-h", "-1"], &["rain rate is -1", "0 to 300 mm/h"]),
-        (&["--wavelengths-nm", "300"], &["300 nm", "400 to 2000 nm"]),
-        (&["--drops", "mono:20"], &["drop diameter is 20", "0.11 to 8 mm"]),
-        (&["--drops", "hail"], &["hail", "marshall-palmer"]),
-        (&["--distance-m", "0"], &["--distance-m is 0"]),
+        (&["rain", "--rate-mm-h", "-1"], &["rain rate is -1", "0 to 300 mm/h"]),
+        (&["rain", "--wavelengths-nm", "300"], &["300 nm", "400 to 2000 nm"]),
+        (&["rain", "--drops", "mono:20"], &["drop diameter is 20", "0.11 to 8 mm"]),
+        (&["rain", "--drops", "hail"], &["hail", "marshall-palmer"]),
+        (&["rain", "--distance-m", "0"], &["--distance-m is 0"]),
         (
-            &["--budget", "--wavelengths-nm", "1800"],
+            &["budget", "--wavelengths-nm", "1800"],
             &["--wavelengths-nm", "1750 to 1850 nm", "400 to 1700 nm"],
         ),
-        (&["--budget", "--distance-m", "100"], &["--distance-m is 100", "0.05 to 65 metres"]),
-        (&["--budget", "--reflectance", "2"], &["reflectance is 2", "at most 1"]),
-        (&["--rig", "--tilt-deg", "30"], &["tilt is 30", "0 to 15"]),
+        (&["budget", "--distance-m", "100"], &["--distance-m is 100", "0.05 to 65 metres"]),
+        (&["budget", "--reflectance", "2"], &["reflectance is 2", "at most 1"]),
+        (&["rig", "--tilt-deg", "30"], &["tilt is 30", "0 to 15"]),
         (
-            &["--mie", "--x", "1e6", "--m-re", "1.3"],
+            &["sphere", "--x", "1e6", "--m-re", "1.3"],
             &["size parameter x is 1000000", "0.01 to 65000"],
         ),
-        (&["--mie", "--x", "1"], &["--m-re"]),
+        (&["sphere", "--x", "1"], &["--m-re"]),
     ];
     for (arguments, told) in mistakes {
-        bench.run(&[&["rain"], *arguments].concat()).failed(2, told);
+        bench.run(&[&["physics"], *arguments].concat()).failed(2, told);
     }
-    bench.run(&["range", "--snr", "0"]).failed(2, &["--snr is 0"]);
-    bench.run(&["range", "--exposures-us", "-8"]).failed(2, &["exposure_us is -8", "more than 0"]);
+    bench.run(&["physics", "range", "--snr", "0"]).failed(2, &["--snr is 0"]);
+    bench
+        .run(&["physics", "range", "--exposures-us", "-8"])
+        .failed(2, &["exposure_us is -8", "more than 0"]);
 }
 
 #[test]
 fn ranges_stand_beside_the_papers_and_the_plot_is_written() {
     let bench = Bench::new();
-    let report = bench.run(&["range", "--out", "range", "--json"]).succeeded().json();
+    let report = bench.run(&["physics", "range", "--out", "range", "--json"]).succeeded().json();
     let rows = report["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 4);
     for row in rows {
@@ -103,7 +110,7 @@ fn ranges_stand_beside_the_papers_and_the_plot_is_written() {
 #[ignore = "long: .ci/run demo"]
 fn curves_of_rain_are_written_as_pictures_and_numbers() {
     let bench = Bench::new();
-    let out = ["rain", "--drops", "mono:2", "--out", "curves"];
+    let out = ["physics", "rain", "--drops", "mono:2", "--out", "curves"];
     let text = bench.run(&out).succeeded().stdout;
     assert!(text.contains("in a rig") && text.contains("wrote curves"), "{text}");
     for name in
@@ -114,7 +121,7 @@ fn curves_of_rain_are_written_as_pictures_and_numbers() {
         assert!(csv.starts_with("line,") && csv.lines().count() > 20, "{name}: {csv}");
     }
     assert_eq!(bench.json("curves/rain.json")["fall"]["rig"]["height_m"], 0.25);
-    bench.run(&["rain", "--budget", "--out", "curves"]).failed(2, &["--budget", "--out"]);
+    bench.run(&["physics", "budget", "--out", "curves"]).failed(2, &["--out"]);
 }
 
 #[test]

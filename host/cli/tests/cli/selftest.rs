@@ -1,4 +1,4 @@
-//! `nirspi selftest`, and the calibration that it leaves for `nirspi capture`.
+//! `nirspi camera selftest`, and the calibration that it leaves for `nirspi capture`.
 
 use crate::bench::Bench;
 use nirspi_optics::Scene;
@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 #[test]
 fn a_self_test_keeps_a_calibration_that_capture_then_uses_and_names() {
     let bench = Bench::new();
-    let report = bench.run(&["selftest", "--json"]).succeeded().json();
+    let report = bench.run(&["camera", "selftest", "--json"]).succeeded().json();
     assert_eq!(report["passed"], true, "{report}");
     let kept = report["calibration"].as_str().unwrap();
     assert!(kept.starts_with(bench.path("data").to_str().unwrap()), "{kept}");
@@ -40,13 +40,15 @@ fn a_self_test_keeps_a_calibration_that_capture_then_uses_and_names() {
 #[test]
 fn a_calibration_of_another_camera_or_gateware_is_refused() {
     let bench = Bench::new();
-    bench.run(&["selftest", "--calibration", "mine.json"]).succeeded();
+    bench.run(&["camera", "selftest", "--calibration", "mine.json"]).succeeded();
     let capture = |more: &[&str]| {
         let arguments = ["capture", "--frames", "3", "--out", "rec.mcap"];
         bench.run(&[&arguments, more].concat())
     };
-    capture(&["--calibration", "mine.json", "--seed", "2"])
-        .failed(1, &["mine.json", "serial number virtual-1", "virtual-2", "nirspi calibrate"]);
+    capture(&["--calibration", "mine.json", "--seed", "2"]).failed(
+        1,
+        &["mine.json", "serial number virtual-1", "virtual-2", "nirspi camera calibrate"],
+    );
     let serial = bench.json("mine.json")["camera"]["serial"].as_str().unwrap().to_owned();
     let mut text = std::fs::read_to_string(bench.path("mine.json")).unwrap();
     text = text.replace(r#""gateware": "0.4.0""#, r#""gateware": "0.0.1""#);
@@ -79,7 +81,7 @@ fn a_failed_self_test_names_the_fault_and_exits_with_1() {
         let options = ServeOptions { once: true, ..ServeOptions::default() };
         serve(&listener, &mut camera, options, &AtomicBool::new(false), &mut |_| {}).unwrap();
     });
-    let outcome = bench.run(&["selftest", "--camera", &address]);
+    let outcome = bench.run(&["camera", "selftest", "--camera", &address]);
     let said = "nirspi: the self-test failed: LED lines\n";
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), said), "{outcome:?}");
     let failed: Vec<&str> =

@@ -98,7 +98,7 @@ fn camera() -> VirtualCamera<nirspi_virtual::OpticalFpga> {
 fn frames_come_through_a_serial_port() {
     let (bench, plugged) = (Bench::new(), Plugged::new());
     let camera = format!("serial:{}:3000000", plugged.path);
-    let info = bench.run(&["info", "--camera", &camera, "--json"]).succeeded().json();
+    let info = bench.run(&["camera", "info", "--camera", &camera, "--json"]).succeeded().json();
     assert_eq!(info["camera"]["serial"], "virtual-7");
     // A second conversation on the same port, after the first has just gone.
     let capture = ["capture", "--camera", &camera, "--frames", "20", "--out", "rec.mcap", "--json"];
@@ -111,5 +111,7 @@ fn frames_come_through_a_serial_port() {
 fn a_serial_port_that_is_not_there_says_how_to_find_one() {
     let bench = Bench::new();
     let camera = "serial:/dev/no-such-port";
-    bench.run(&["info", "--camera", camera]).failed(1, &[camera, "nirspi devices"]);
+    bench
+        .run(&["camera", "info", "--camera", camera])
+        .failed(1, &[camera, "nirspi camera devices"]);
 }

@@ -381,7 +381,7 @@ fn a_camera_of_unknown_latency_shows_a_red_state_and_no_picture() {
     let is_red = |state: &Value| state["camera"]["phase"] == "uncalibrated";
     let red = server.state("uncalibrated", is_red);
     let line = red["camera"]["line"].as_str().unwrap();
-    assert!(line.contains("too dim") && line.contains("nirspi calibrate"), "{line}");
+    assert!(line.contains("too dim") && line.contains("nirspi camera calibrate"), "{line}");
     assert!(red["picture"].is_null(), "{red}");
     server.get("/image.png").refuses(503, "no such image");
 }
@@ -415,7 +415,7 @@ fn what_cannot_be_served_is_said_in_one_line() {
 fn a_camera_that_goes_is_said_to_be_gone_and_looked_for_again() {
     let bench = Bench::new();
     let virtual_camera = |at: &str| {
-        let mut camera = bench.start(&["virtual", "--listen", at]);
+        let mut camera = bench.start(&["dev", "virtual", "--listen", at]);
         let line = camera.says("virtual camera on tcp:");
         let address = line.split_whitespace().find_map(|word| word.strip_prefix("tcp:")).unwrap();
         (camera, address.trim_end_matches(':').to_owned())

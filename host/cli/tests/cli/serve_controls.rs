@@ -177,7 +177,7 @@ fn a_page_draws_the_scene_of_a_virtual_camera_and_moves_it() {
 #[test]
 fn the_scene_of_a_real_camera_cannot_be_changed() {
     let bench = Bench::new();
-    let mut camera = bench.start(&["virtual", "--listen", "127.0.0.1:0"]);
+    let mut camera = bench.start(&["dev", "virtual", "--listen", "127.0.0.1:0"]);
     let line = camera.says("virtual camera on tcp:");
     let address = line.split_whitespace().find_map(|word| word.strip_prefix("tcp:")).unwrap();
     let server = serve(&bench, &["--camera", &format!("tcp:{}", address.trim_end_matches(':'))]);

@@ -30,7 +30,7 @@ fn the_command_line_beats_the_environment_and_that_the_file() {
     let found = report(&bench, &variables, &file);
     assert_eq!((&found["method"], &found["order"]), (&"tv".into(), &"zig-zag".into()), "{found}");
     let found =
-        report(&bench, &variables, &["--setup=lab.toml", "--method", "fista", "--sampling=0.5"]);
+        report(&bench, &variables, &["--settings=lab.toml", "--method", "fista", "--sampling=0.5"]);
     assert_eq!((&found["method"], &found["used"]), (&"fista".into(), &128.into()), "{found}");
 
     // The file itself, named by a variable; and in front of the command.
@@ -64,7 +64,7 @@ fn what_is_saved_gives_the_same_again_and_leaves_the_rest_of_the_file() {
     let bench = with_measurement();
     bench.write("lab.toml", b"# my bench\n[capture]\nframes = 9\n");
     let chosen = ["--method", "omp", "--sampling", "30%", "--sparsity", "12", "--transpose"];
-    let save = ["--save-setup", "lab.toml", "--out", "a"];
+    let save = ["--save-settings", "lab.toml", "--out", "a"];
     let first = bench.run(&[&["reconstruct", "in.npz", "--json"][..], &chosen, &save].concat());
     assert!(
         first.code == Some(0) && first.stderr == "nirspi: settings saved in lab.toml\n",

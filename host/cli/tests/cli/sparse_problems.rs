@@ -1,4 +1,4 @@
-//! `nirspi bench omp` and `nirspi eval sampling`.
+//! `nirspi dev bench omp` and `nirspi eval sampling`.
 
 use crate::bench::{Bench, Measured, npz};
 use std::io::{Read, Write};
@@ -32,8 +32,16 @@ fn a_given_problem_is_solved_and_timed() {
     let bench = Bench::new();
     bench.write("problem.npz", &problem());
     for precision in ["auto", "f32", "f64"] {
-        let arguments =
-            ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz", "--overwrite"];
+        let arguments = [
+            "dev",
+            "bench",
+            "omp",
+            "--input",
+            "problem.npz",
+            "--out",
+            "solution.npz",
+            "--overwrite",
+        ];
         let further = ["--repeats", "3", "--precision", precision];
         let report = bench.run(&[&arguments[..], &further].concat()).succeeded().json();
         assert!(report["median_ms"].as_f64().unwrap() > 0.0, "{report}");
@@ -50,7 +58,7 @@ fn a_given_problem_is_solved_and_timed() {
 fn a_problem_that_does_not_fit_leaves_nothing_behind() {
     let bench = Bench::new();
     bench.write("problem.npz", &npz(&[("D", &[2, 3], &[1.0; 6]), ("Y", &[1, 3], &[1.0; 3])]));
-    let arguments = ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz"];
+    let arguments = ["dev", "bench", "omp", "--input", "problem.npz", "--out", "solution.npz"];
     bench.run(&arguments).failed(1, &["problem.npz", "no `k`", "D, Y and k"]);
     assert_eq!(bench.names(), ["problem.npz"]);
 }
@@ -58,7 +66,8 @@ fn a_problem_that_does_not_fit_leaves_nothing_behind() {
 #[test]
 fn a_random_problem_needs_no_file() {
     let bench = Bench::new();
-    let arguments = ["bench", "omp", "--measurements", "128", "--sparsity", "8", "--frames", "3"];
+    let arguments =
+        ["dev", "bench", "omp", "--measurements", "128", "--sparsity", "8", "--frames", "3"];
     let report = bench.run(&[&arguments[..], &["--repeats", "1"]].concat()).succeeded().json();
     assert_eq!((&report["measurements"], &report["mean_atoms"]), (&128.into(), &8.0.into()));
 }
@@ -66,7 +75,7 @@ fn a_random_problem_needs_no_file() {
 /// What wgpu finds here, or `None` (said aloud) if nothing.
 fn adapter(bench: &Bench) -> Option<String> {
     let arguments =
-        ["bench", "omp", "--backend", "wgpu", "--measurements", "16", "--sparsity", "1"];
+        ["dev", "bench", "omp", "--backend", "wgpu", "--measurements", "16", "--sparsity", "1"];
     let said = bench.run(&arguments);
     if said.code != Some(0) {
         assert!(said.stderr.contains("no GPU found (wgpu: "), "{said:?}");
@@ -83,8 +92,17 @@ fn a_device_asked_for_by_name_computes_and_is_named() {
     let Some(adapter) = adapter(&bench) else { return };
     bench.write("problem.npz", &problem());
     for precision in ["auto", "f32"] {
-        let arguments =
-            ["bench", "omp", "--input", "problem.npz", "--out", "solution.npz", "--repeats", "2"];
+        let arguments = [
+            "dev",
+            "bench",
+            "omp",
+            "--input",
+            "problem.npz",
+            "--out",
+            "solution.npz",
+            "--repeats",
+            "2",
+        ];
         let named = ["--backend", "wgpu", "--precision", precision];
         let report = bench.run(&[&arguments[..], &named].concat()).succeeded().json();
         assert_eq!(report["device"], adapter.as_str());
@@ -94,7 +112,7 @@ fn a_device_asked_for_by_name_computes_and_is_named() {
         let coef = array(&bench, "solution.npz", "coef", f64::from_le_bytes);
         assert!((coef[0] + 4.0).abs() < 1e-5 && (coef[3] - 2.0).abs() < 1e-5, "{coef:?}");
     }
-    let double = ["bench", "omp", "--backend", "wgpu", "--precision", "f64"];
+    let double = ["dev", "bench", "omp", "--backend", "wgpu", "--precision", "f64"];
     bench.run(&double).failed(1, &["f32", "cpu backend for f64"]);
 
     let measured = Measured::new(16);
@@ -115,7 +133,8 @@ fn a_device_asked_for_by_name_computes_and_is_named() {
 #[test]
 fn without_a_gpu_auto_says_so_once_and_goes_on() {
     let bench = Bench::new();
-    let arguments = ["bench", "omp", "--measurements", "64", "--sparsity", "4", "--repeats", "1"];
+    let arguments =
+        ["dev", "bench", "omp", "--measurements", "64", "--sparsity", "4", "--repeats", "1"];
     let run = |more: &[&str]| bench.run(&[&arguments[..], more].concat());
     // The batch is too small for a GPU, or the CPU was chosen: the program looks for no GPU.
     assert_eq!(run(&["--frames", "63"]).succeeded().json()["backend"], "cpu");

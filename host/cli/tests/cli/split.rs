@@ -21,7 +21,7 @@ fn a_split_capture_names_its_files_and_each_is_read_alone() {
     assert_eq!(files, expected);
     let mut frames = 0;
     for (at, file) in files.iter().enumerate() {
-        let info = bench.run(&["info", file, "--json"]).succeeded().json();
+        let info = bench.run(&["camera", "info", file, "--json"]).succeeded().json();
         assert_eq!((&info["damage"], &info["account"]["missing"]), (&().into(), &().into()));
         assert_eq!(info["part"]["first_frame"], frames, "{info}");
         let next = files.get(at + 1).map(String::as_str);

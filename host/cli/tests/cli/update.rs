@@ -1,4 +1,4 @@
-//! `nirspi update`, up to where a camera that can be updated would be needed: `host/update/src/tests.rs` goes on.
+//! `nirspi camera update`, up to where a camera that can be updated would be needed: `host/update/src/tests.rs` goes on.
 
 use crate::bench::Bench;
 use nirspi_update::{Component, Source, pack};
@@ -19,7 +19,7 @@ fn a_release_that_does_not_fit_is_one_line_and_changes_nothing() {
     ];
     pack(&sources, &bench.path("release")).unwrap();
     let update = |what: &str, more: &[&str]| {
-        bench.run(&[&["update", what, "--camera", "virtual"], more].concat())
+        bench.run(&[&["camera", "update", what, "--camera", "virtual"], more].concat())
     };
     update("release", &[]).failed(1, &["nucleo-u5a5zj-q", "camera's board is virtual"]);
     for more in [&["--check", "--json"][..], &["--check"], &[]] {

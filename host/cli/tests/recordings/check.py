@@ -39,7 +39,7 @@ def messages(name):
 
 run("capture", "--frames", "12", "--sampling", "0.5", "--out", "rec.mcap")
 for kind in ("mcap", "npz", "npy", "csv", "apng"):
-    run("export", "rec.mcap", "--to", kind, "--out", f"out.{kind}")
+    run("recording", "export", "rec.mcap", "--to", kind, "--out", f"out.{kind}")
 run("reconstruct", "rec.mcap", "--out", "sum", "--no-flat-field")
 
 # The image channel holds the image of `reconstruct`, scaled from 0 to 1 in float32.
@@ -88,7 +88,7 @@ fields.pictures(folder)
 
 # The camera's time is longer than that of one depth map.
 run("capture", "--frames", "1100", "--sampling", "0.02", "--sweeps", "60", "--out", "long.mcap")
-run("export", "long.mcap", "--to", "mcap", "--out", "long-out.mcap")
+run("recording", "export", "long.mcap", "--to", "mcap", "--out", "long-out.mcap")
 
 # Depth maps are in the exported file alone, at the times of their packets.
 recorded, wire, _ = messages("long.mcap")
@@ -101,7 +101,7 @@ assert maps[0][1].encoding == "32FC1" and 0.25 < np.median(depth_m) < 0.35, np.m
 print(f"depth: {len(maps)} maps, median {np.median(depth_m):.3f} m (simulated)")
 
 # Enhanced images are those of `reconstruct --enhance`, each with its spread and its intervals.
-run("export", "rec.mcap", "--to", "mcap", "--enhance", "--out", "enhanced.mcap")
+run("recording", "export", "rec.mcap", "--to", "mcap", "--enhance", "--out", "enhanced.mcap")
 run("reconstruct", "rec.mcap", "--enhance", "--out", "enhanced", "--no-flat-field")
 made = {c.topic: m for _, c, _, m in messages("enhanced.mcap")[0]}
 topics = ("/enhanced", "/spread", "/interval")

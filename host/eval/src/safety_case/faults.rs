@@ -1,6 +1,6 @@
 //! Single faults of a camera, one by one: what stays lit, what ends the light, and how soon.
 //!
-//! Each row rests on tests or proofs that are named; a test of `docs/safety.md` sees that they
+//! Each row rests on tests or proofs that are named; a test of `docs/log/safety.md` sees that they
 //! exist. The electronics of the array are computed and were never built, so their barriers are
 //! named as an addition and no time rests on them.
 

@@ -14,6 +14,7 @@
 //! images.
 
 use nalgebra::{DMatrix, RowDVector};
+use nirspi_recon::words::count_of;
 use thiserror::Error;
 
 /// Why two sets have no distance.
@@ -21,7 +22,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum FrechetError {
     /// A set has fewer than two images, so it has no covariance.
-    #[error("the {which} set has {found} images, expected at least 2")]
+    #[error("the {which} set has {}, expected at least 2", count_of(*found, "image"))]
     TooFew {
         /// `reference` or `test`.
         which: &'static str,

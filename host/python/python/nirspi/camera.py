@@ -157,7 +157,7 @@ class Camera:
     differential : bool
         Whether each pattern is followed by its complement.
     calibration : str or path
-        "kept": latency and settling kept for the camera by ``nirspi calibrate``, or measured on the
+        "kept": latency and settling kept for the camera by ``nirspi camera calibrate``, or measured on the
         scene if none are kept; a virtual camera measures them against its simulated white sheet.
         "measure": always measured on the scene. "off": none, with ``adc_latency``. Or a file.
     adc_latency : int, optional

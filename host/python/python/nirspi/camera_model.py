@@ -25,7 +25,7 @@ class CameraModel:
     toml : str
         The whole description.
     report : dict
-        Field, light, noise and eye safety, as ``nirspi camera-model --json``.
+        Field, light, noise and eye safety, as ``nirspi camera model --json``.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What rain, fog and single drops do to light: the numbers of ``nirspi rain``."""
+"""What rain, fog and single drops do to light: the numbers of ``nirspi physics rain``."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ def test_the_program_gives_fsrcnn_the_depth_that_training_gives_it(tmp_path, cli
     np.save(tmp_path / "in.npy", read["y"][0])
     np.save(tmp_path / "depth.npy", read["depth_m"])
     options = ["--depth", "depth.npy", "--weights", weights, "--backend", "cpu", "--out", "out.npy"]
-    command_line = [cli, "upscale", "in.npy", *options]
+    command_line = [cli, "dev", "upscale", "in.npy", *options]
     subprocess.run(command_line, cwd=tmp_path, check=True, capture_output=True)
     found = torch.from_numpy(np.load(tmp_path / "out.npy").reshape(64, 64))
     assert (blind - expected).abs().max() > 1e-2

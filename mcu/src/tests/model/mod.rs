@@ -6,7 +6,7 @@
 //! tell apart are one state (`World::key`), so the walk ends by itself when nothing new appears. The
 //! graph then shows what no single step can: every state has a way out, and every run ends.
 //!
-//! What the walk leaves out is stated in `docs/firmware.md`, beside its figures.
+//! What the walk leaves out is stated in `docs/log/firmware.md`, beside its figures.
 
 mod world;
 

@@ -3,7 +3,7 @@
 //! Assumed: the kernel's clock is the core's; data come at two clocks a byte behind opcode, address and dummy cycles; a FIFO
 //! of 32 bytes stops the clock when it is full. Not modelled: the hold time of chip select, delay blocks, DQS, the skew of
 //! lines. Half a period of sample shift is required for packets and forbidden for slower accesses
-//! (`docs/gateware.md`, Packets clocked by sck).
+//! (`docs/log/gateware.md`, Packets clocked by sck).
 
 use super::Chip;
 use super::map::{OCTOSPI1, OCTOSPIM};

@@ -6,7 +6,7 @@
 use super::Chip;
 use super::map::{PSSI, TIM3};
 
-/// Time of a byte: 42 bytes in a microsecond (`docs/gateware.md`, Parallel port).
+/// Time of a byte: 42 bytes in a microsecond (`docs/log/gateware.md`, Parallel port).
 const BYTE_PS: u64 = 24_000;
 /// Bytes that come after `ready` has fallen.
 const LATE: usize = 4;

@@ -46,7 +46,7 @@ fn the_program_captures_over_tcp_as_from_a_camera_on_a_bench() {
         said
     };
     let begun = Instant::now();
-    let said = run(&["info", "--camera", &camera]);
+    let said = run(&["camera", "info", "--camera", &camera]);
     assert!(said.contains("nucleo-u5a5zj-q"), "{said}");
     let recording = out.join("frames.mcap");
     std::fs::create_dir_all(&out).unwrap();

@@ -8,7 +8,7 @@
 //!
 //! Gain belongs to the LED array and the lens, so a flat field holds at any distance, for any
 //! scene, order of patterns and method. A flat field is measured against a white sheet that fills
-//! the field (`nirspi calibrate --white`), kept by serial number next to the calibration, and
+//! the field (`nirspi camera calibrate --white`), kept by serial number next to the calibration, and
 //! applied by `capture --picture`, `serve` and `reconstruct`.
 //!
 //! # Invariant

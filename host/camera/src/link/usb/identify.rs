@@ -169,7 +169,7 @@ fn none(wanted: Option<&str>, there: &[String]) -> String {
 /// What to do about a missing permission.
 fn permission_hint(linux: bool) -> &'static str {
     if linux {
-        ": sudo nirspi setup; over SSH and in a service sudo nirspi setup --group GROUP, with a group of yours"
+        ": sudo nirspi camera setup; over SSH and in a service sudo nirspi camera setup --group GROUP, with a group of yours"
     } else {
         ""
     }
@@ -243,8 +243,8 @@ mod tests {
 
     #[test]
     fn a_missing_permission_names_the_command_for_people_and_for_services() {
-        assert!(permission_hint(true).contains("sudo nirspi setup; "));
-        assert!(permission_hint(true).contains("nirspi setup --group"));
+        assert!(permission_hint(true).contains("sudo nirspi camera setup; "));
+        assert!(permission_hint(true).contains("nirspi camera setup --group"));
         let error = UsbError::Permission { camera: "usb:A1".to_owned() }.to_string();
         assert!(error.starts_with("no permission to open usb:A1"), "{error}");
     }

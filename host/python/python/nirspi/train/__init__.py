@@ -53,7 +53,7 @@ def train(
     data : sequence of paths
         ``letters.npz``, or folders of such files. Without any, scenes are shapes.
     pairs : sequence of paths
-        Files of ``nirspi pairs``, of the same data.
+        Files of ``nirspi dev pairs``, of the same data.
     fsrcnn : path, optional
         Weights that enlarge the readings, for the deblurring networks.
     resume : bool

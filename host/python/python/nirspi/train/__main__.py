@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="FILE",
-        help="pairs of nirspi pairs, of the same --data",
+        help="pairs of nirspi dev pairs, of the same --data",
     )
     add(
         "--fsrcnn",

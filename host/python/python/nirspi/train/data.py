@@ -142,7 +142,7 @@ def split(stacks, share, seed):
 
 
 def pairs(paths, stacks, masks):
-    """Scenes and the virtual camera's pictures of them, made by ``nirspi pairs``.
+    """Scenes and the virtual camera's pictures of them, made by ``nirspi dev pairs``.
 
     Those of held-out groups are left out: `stack` and `group` of a file are those of the same data in the
     same order.
@@ -152,7 +152,7 @@ def pairs(paths, stacks, masks):
         arrays = _arrays(path)
         missing = [name for name in PAIRS if name not in arrays]
         if missing:
-            raise Error(f"{path}: no array {', '.join(missing)}, expected pairs of nirspi pairs")
+            raise Error(f"{path}: no array {', '.join(missing)}, expected pairs of nirspi dev pairs")
         held = {(i, int(g)) for i, mask in enumerate(masks) for g in np.unique(stacks[i].groups[mask])}
         known = {(i, int(g)) for i, stack in enumerate(stacks) for g in np.unique(stack.groups)} | {(-1, -1)}
         places = list(zip(arrays["stack"].tolist(), arrays["group"].tolist(), strict=True))
