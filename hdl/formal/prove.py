@@ -152,6 +152,12 @@ FAULTS = (
         (("leds", "else if (halt) begin\n            active <= 0;", "else if (1'b0) begin"),),
     ),
     Fault(
+        SAFETY,
+        "a run without light is lit",
+        "dark_when_unlit",
+        (("leds", "lights <= active[2] && !settings.unlit;", "lights <= active[2];"),),
+    ),
+    Fault(
         FIFO,
         "full is seen a word late",
         "never_over_full",

@@ -86,13 +86,16 @@ module safety (
         dark_until_restarted:  assert (!(enable && opened));
         dark_without_run:      assert (!(enable && !dut.running && !coming && !dut.halt));
         dark_when_host_silent: assert (!(enable && silent > limit + DEPTH));
-        lines_low_when_dark:   assert (enable || !lines_were_up_in_the_dark || rows == 0 && columns == 0);
+        dark_when_unlit:       assert (!(enable && dut.settings.unlit && !dut.halt));
+        lines_low_when_dark:   assert (enable || !lines_were_up_in_the_dark || rows == 0 && columns == 0
+            || dut.settings.unlit && (dut.running || coming || dut.halt));
         fault_latched:         assert (fault_before == 0 || dut.fault == fault_before || forgotten);
 
 `ifdef INDUCTION
         // What makes them inductive.
         invariant_opened:      assert (opened == dut.guard.dropped);
         invariant_lit_stages:  assert (!((dut.array.counters.active || dut.array.active != 0) && !dut.running && !coming && !dut.halt));
+        invariant_lights:      assert (!dut.array.lights || dut.array.active[3] && (!dut.settings.unlit || dut.halt));
         invariant_no_run_in_fault: assert (!(dut.running && dut.fault != 0));
         for (int i = 0; i < 15; i++) begin
             assert (!dut.command.going[i] || silent == 30'(i + 1) && dut.command.busy && dut.command.age == 6'(i + 2));

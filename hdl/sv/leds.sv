@@ -2,7 +2,8 @@
 ///
 /// Invariant: lines change only at a slot's first clock and are all 0 outside a run. The last stage asks
 /// for the permission once more, whatever the stages before it say: `enable` falls in the clock after it is
-/// withdrawn, the other lines, which light nothing without it, a clock later.
+/// withdrawn, the other lines, which light nothing without it, a clock later. A run without light shows its lines, and
+/// `enable` stays low.
 module nirspi_leds (
     input  var logic                           clk        ,
     input  var logic                           rst        ,
@@ -18,7 +19,7 @@ module nirspi_leds (
     output var logic                           enable     ,
     output var logic                           lit        , /// As `enable`, but for the permission
     output var logic                           full       , /// All LEDs are lit
-    output var logic                           dark        /// None is, though the lines are driven
+    output var logic                           dark        /// None is, though `lit`
 );
     nirspi_types::Place place;
     nirspi_sequencer counters (
@@ -44,6 +45,7 @@ module nirspi_leds (
 
     // Stages 1 and 2: the table is read. Stage 3: the pattern. Stage 4: its lines.
     logic [4-1:0]  active      ;
+    logic          lights      ; // as `active[3]`, in a run with light
     logic [4-1:0]  complement  ;
     logic [3-1:0]  inverts_rows;
     logic [3-1:0]  inverts     ;
@@ -66,10 +68,13 @@ module nirspi_leds (
     always_ff @ (posedge clk) begin
         if (rst) begin
             active <= 0;
+            lights <= 0;
         end else if (halt) begin
             active <= 0;
+            lights <= 0;
         end else begin
             active <= {active[2:0], place.active};
+            lights <= active[2] && !settings.unlit;
         end
     end
 
@@ -92,8 +97,10 @@ module nirspi_leds (
     end
 
     // Stage 5: the registers at the pins.
-    logic shown;
-    always_comb shown = active[3] && permitted && !halt;
+    logic shown ;
+    logic shines;
+    always_comb shown  = active[3] && permitted && !halt;
+    always_comb shines = lights && permitted && !halt;
 
     always_ff @ (posedge clk) begin
         if (rst) begin
@@ -106,10 +113,10 @@ module nirspi_leds (
         end else begin
             rows    <= ((shown) ? ( next_rows ) : ( 0 ));
             columns <= ((shown) ? ( next_columns ) : ( 0 ));
-            enable  <= shown && permit;
-            lit     <= active[3];
-            full    <= active[3] && zero && !complement[3];
-            dark    <= active[3] && zero && complement[3];
+            enable  <= shines && permit;
+            lit     <= lights;
+            full    <= lights && zero && !complement[3];
+            dark    <= lights && zero && complement[3];
         end
     end
 endmodule

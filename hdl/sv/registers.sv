@@ -127,6 +127,7 @@ module nirspi_registers
         next.differential     <= (mode & MODE_DIFFERENTIAL) != 0;
         next.alternating      <= (mode & MODE_ALTERNATING) != 0 && (mode & MODE_DIFFERENTIAL) != 0;
         next.test_source      <= (mode & MODE_TEST_SOURCE) != 0;
+        next.unlit            <= (mode & MODE_UNLIT) != 0;
         next.packets          <= (mode & MODE_PACKETS) != 0;
         next.narrow           <= (mode & MODE_NARROW) != 0;
         next.patterns         <= patterns[10:0];

@@ -8,6 +8,7 @@ package nirspi_types;
         logic          differential    ;
         logic          alternating     ; /// Sweeps differ in which comes first, and in the sign of all lines
         logic          test_source     ;
+        logic          unlit           ; /// Lines are shown without light
         logic          packets         ; /// Frames are sent as packets
         logic          narrow          ; /// Samples of a packet have 24 bits
         logic [11-1:0] patterns        ;

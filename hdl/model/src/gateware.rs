@@ -228,6 +228,13 @@ impl Gateware {
         self.run.is_some()
     }
 
+    /// Whether a run or raw burst in progress takes the ADC's samples, and not those of the test generator.
+    #[must_use]
+    #[inline]
+    pub fn reads_adc(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| !run.settings.test_source)
+    }
+
     /// Level of the `frame ready` pin.
     #[must_use]
     pub fn frame_ready(&self) -> bool {

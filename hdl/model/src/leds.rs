@@ -54,13 +54,19 @@ pub(crate) struct Leds {
     sequencer: Sequencer,
     lines: Lines,
     half_arrays: u32,
+    /// The last slot is over.
+    over: bool,
 }
 
 impl Leds {
     /// Shows the first slot.
     pub(crate) fn start(settings: &Settings, table: &OrderTable) -> Self {
-        let mut leds =
-            Self { sequencer: Sequencer::default(), lines: Lines::default(), half_arrays: 0 };
+        let mut leds = Self {
+            sequencer: Sequencer::default(),
+            lines: Lines::default(),
+            half_arrays: 0,
+            over: false,
+        };
         leds.show(settings, table);
         leds
     }
@@ -79,7 +85,7 @@ impl Leds {
     /// Moves to the next clock.
     #[inline]
     pub(crate) fn step(&mut self, settings: &Settings, table: &OrderTable) {
-        if !self.lines.enable {
+        if self.over {
             return;
         }
         match self.sequencer.step(settings) {
@@ -88,6 +94,7 @@ impl Leds {
             Ended::Run => {
                 self.lines = Lines::default();
                 self.half_arrays = 0;
+                self.over = true;
             }
         }
     }
@@ -104,8 +111,8 @@ impl Leds {
         self.lines = Lines {
             rows: signs(pattern / side, complement != inverted),
             columns: signs(pattern % side, inverted),
-            enable: true,
+            enable: !settings.unlit,
         };
-        self.half_arrays = half_arrays(pattern, complement);
+        self.half_arrays = if settings.unlit { 0 } else { half_arrays(pattern, complement) };
     }
 }

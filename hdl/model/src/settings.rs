@@ -23,6 +23,8 @@ pub(crate) struct Settings {
     /// with `differential`.
     pub(crate) alternating: bool,
     pub(crate) test_source: bool,
+    /// Lines are shown without light.
+    pub(crate) unlit: bool,
     /// Frames are sent as packets.
     pub(crate) packets: bool,
     /// Bits of a sample of a packet.
@@ -71,6 +73,7 @@ impl Settings {
             differential: bits & mode::DIFFERENTIAL != 0,
             alternating: bits & mode::ALTERNATING != 0 && bits & mode::DIFFERENTIAL != 0,
             test_source: bits & mode::TEST_SOURCE != 0,
+            unlit: bits & mode::UNLIT != 0,
             packets: bits & mode::PACKETS != 0,
             width: if bits & mode::NARROW == 0 { Width::Bits32 } else { Width::Bits24 },
             parallel: bits & mode::PARALLEL != 0,

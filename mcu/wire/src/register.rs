@@ -26,7 +26,7 @@
 //!   [`Register::Clocks`], [`Register::Design`] and [`Register::Sampling`] are answered with or without the ADC's clock. Everything
 //!   else needs the ADC's clock: without it a read gives [`NO_CLOCK`], a write does nothing, and frames
 //!   and bursts are zeros. When the clock comes back, everything but these five is as after reset.
-//! * LEDs are on only while a run or raw burst is under way, no fault is latched and the interlock
+//! * LEDs are on only while a run or raw burst without [`mode::UNLIT`] is under way, no fault is latched and the interlock
 //!   input is closed. A fault ends the run at once, discards the unfinished frame and latches its
 //!   first code.
 
@@ -342,6 +342,9 @@ pub mod mode {
     /// stay those of pattern and complement. What comes of the place in a pair, or of the lines' own charge, changes its
     /// sign and cancels in four sweeps. Without `DIFFERENTIAL` the bit changes nothing.
     pub const ALTERNATING: u32 = 1 << 7;
+    /// The run shows its lines without light: the LED enable stays low, and nothing is spent of the light budget. All else
+    /// is as in any run: samples, sums, frames, packets, raw bursts, interlock, faults.
+    pub const UNLIT: u32 = 1 << 8;
     /// Every bit that has a meaning; a start with any other is refused.
     pub const DEFINED: u32 = DIFFERENTIAL
         | ORDER_SEQUENCY
@@ -350,7 +353,8 @@ pub mod mode {
         | PACKETS
         | NARROW
         | PARALLEL
-        | ALTERNATING;
+        | ALTERNATING
+        | UNLIT;
 }
 
 /// Reason latched in [`Register::Fault`].

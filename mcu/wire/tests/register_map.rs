@@ -87,8 +87,9 @@ fn bits_codes_and_limits_are_these() {
         mode::NARROW,
         mode::PARALLEL,
         mode::ALTERNATING,
+        mode::UNLIT,
     ];
-    assert_eq!((mode, mode::DEFINED), ([1, 2, 4, 8, 16, 32, 64, 128], 255));
+    assert_eq!((mode, mode::DEFINED), ([1, 2, 4, 8, 16, 32, 64, 128, 256], 511));
     let flags = [
         FrameFlags::OVER_RANGE,
         FrameFlags::OVERFLOW,

@@ -193,6 +193,54 @@ fn light_is_counted_in_half_arrays_a_clock() {
     }
 }
 
+/// The same run with and without light: lines, samples and sums are the same.
+#[test]
+fn a_run_without_light_shows_its_lines_and_spends_nothing() {
+    let mut lit = Bench::new();
+    let mut unlit = Bench::new();
+    for (bench, bits) in [(&mut lit, 0), (&mut unlit, mode::UNLIT)] {
+        bench.set(Register::Mode, mode::DIFFERENTIAL | bits);
+        bench.set(Register::Patterns, 3);
+        bench.set(Register::Latency, 9);
+        bench.set(Register::Frames, 2);
+        bench.set(Register::DutyLimit, if bits == 0 { DUTY_LIMIT_MAX } else { 0 });
+        bench.start();
+    }
+    let mut shown = 0;
+    for t in 0..2 * 30 + 9 {
+        let (with, without) = (lit.0.lines(), unlit.0.lines());
+        assert_eq!((with.rows, with.columns), (without.rows, without.columns), "clock {t}");
+        assert!(!without.enable && !unlit.status(status::LEDS_ON), "clock {t}");
+        shown += u32::from(with.enable);
+        assert_eq!(lit.0.running(), unlit.0.running(), "clock {t}");
+        lit.tick(t * 7);
+        unlit.tick(t * 7);
+        if lit.0.frame_ready() {
+            let (with, without) = (lit.take_frame(), unlit.take_frame());
+            assert_eq!(with.sums, without.sums);
+        }
+    }
+    assert_eq!(shown, 60);
+    assert_eq!((lit.fault(), unlit.fault()), (FaultCode::None, FaultCode::None));
+    assert!(!unlit.0.running() && unlit.get(Register::FramesMade) == 2);
+}
+
+/// A start takes the bit as it takes any setting; and a burst has no light either.
+#[test]
+fn a_burst_without_light_is_dark_and_the_next_run_is_lit() {
+    let mut bench = Bench::new();
+    bench.set(Register::Mode, mode::UNLIT);
+    bench.set(Register::RawLength, 50);
+    bench.control(control::START_RAW);
+    bench.set(Register::Mode, 0);
+    assert_eq!(bench.ticks_until_dark(DARK, 100), 0);
+    assert!(bench.0.running());
+    bench.ticks(50);
+    assert!(bench.0.raw_ready() && !bench.0.running());
+    bench.start();
+    assert!(bench.0.lines().enable);
+}
+
 #[test]
 fn the_dark_end_of_a_run_costs_no_light() {
     let mut bench = Bench::new();
@@ -318,6 +366,7 @@ fn deed() -> impl Strategy<Value = Deed> {
         (Register::Latency, 9),
         (Register::RawLength, 20),
         (Register::Mode, mode::DIFFERENTIAL),
+        (Register::Mode, mode::UNLIT),
     ]);
     prop_oneof![
         4 => (0u32..32).prop_map(move |bits| Deed::Write(control, bits)),
@@ -367,7 +416,7 @@ proptest! {
                 let bits = copy.read(Register::Status.address()).unwrap();
                 if lines.enable {
                     prop_assert!(gateware.running() && closed && fault == 0);
-                } else {
+                } else if !gateware.running() {
                     prop_assert_eq!((lines.rows, lines.columns), (0, 0));
                 }
                 prop_assert!(latched == 0 || fault == latched || may_clear, "fault lost");

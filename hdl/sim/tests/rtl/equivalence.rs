@@ -163,6 +163,7 @@ fn random_scenarios_agree_bit_for_bit() {
     println!("{tallies:#?}");
     for (what, seen) in [
         ("lit clocks", count(&tallies, |t| t.lit_clocks)),
+        ("clocks of runs without light", count(&tallies, |t| t.unlit_clocks)),
         ("frames", count(&tallies, |t| t.frames)),
         ("frames with over-range samples", count(&tallies, |t| t.frames_over_range)),
         ("frames after a loss", count(&tallies, |t| t.frames_after_loss)),

@@ -78,6 +78,7 @@ pub fn package() -> String {
         ("MODE_NARROW", mode::NARROW),
         ("MODE_PARALLEL", mode::PARALLEL),
         ("MODE_ALTERNATING", mode::ALTERNATING),
+        ("MODE_UNLIT", mode::UNLIT),
         ("MODE_DEFINED", mode::DEFINED),
         ("FAULT_WATCHDOG", FaultCode::Watchdog as u32),
         ("FAULT_DUTY", FaultCode::Duty as u32),

@@ -17,7 +17,7 @@ use nirspi_wire::{
     DeviceMessage, FrameFlags, crc32,
     fpga::{FpgaFrame, Sums},
     open,
-    register::{Design, Register, clocks, control},
+    register::{Design, Register, clocks, control, mode},
     samples::Width,
 };
 use std::collections::VecDeque;
@@ -112,6 +112,8 @@ pub struct Rig {
     grace: u64,
     /// LEDs were enabled in the clock before.
     just_lit: bool,
+    /// The run under way, or the last one, is without light.
+    unlit: bool,
     /// The last inputs of the model, for the report of a difference.
     told: VecDeque<String>,
     pub mismatch: Option<String>,
@@ -141,6 +143,8 @@ impl Default for Variant {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tally {
     pub lit_clocks: u64,
+    /// Clocks of runs without light.
+    pub unlit_clocks: u64,
     pub frames: u64,
     pub frames_over_range: u64,
     pub frames_overflow: u64,
@@ -229,6 +233,7 @@ impl Rig {
             written_twice: 0,
             grace: 0,
             just_lit: false,
+            unlit: false,
             told: VecDeque::new(),
             mismatch: None,
             variant: Variant::default(),
@@ -358,7 +363,7 @@ impl Rig {
         self.interlock.clear();
         self.receiver.iter_mut().for_each(Receiver::forget);
         (self.dark, self.put_out) = (0..u64::MAX, true);
-        (self.grace, self.just_lit) = (0, false);
+        (self.grace, self.just_lit, self.unlit) = (0, false, false);
         self.tell("the ADC's clock is back".into());
         self.interlock(self.closed);
     }
@@ -390,18 +395,10 @@ impl Rig {
             sample.code = sample.code >> 1 | u16::from(now % self.tilt < self.tilt / 2) << 13;
         }
         self.pins.sample(sample);
-        let mut leds = self.pins.leds();
-        // Without `enable` the other lines light nothing, and may follow a clock later.
-        if !leds.enable {
-            if !std::mem::take(&mut self.just_lit) {
-                self.expect("lines without enable", &leds, &Lines::default());
-            }
-            leds = Lines::default();
-        }
-        self.just_lit |= leds.enable;
+        let leds = self.pins.leds();
         self.put_out |= self.dark.contains(&now);
         if self.put_out {
-            self.expect("LEDs after the interlock opened", &leds, &Lines::default());
+            self.expect("LEDs after the interlock opened", &leds.enable, &false);
         }
         self.seen.push_back(Seen { sample, leds, put_out: self.put_out });
         if self.seen.len() as u64 > DEPTH - TO_PINS + 1 {
@@ -423,7 +420,7 @@ impl Rig {
             let expected = (self.model.frame_ready(), self.model.raw_ready());
             self.expect("ready pins", &ready, &expected);
         }
-        let was_lit = self.model.lines().enable;
+        let was_shown = self.shows();
         while self.interlock.front().is_some_and(|&(at, _)| at == t) {
             let (_, closed) = self.interlock.pop_front().unwrap();
             self.model.set_interlock(closed);
@@ -447,33 +444,55 @@ impl Rig {
             self.tell(format!("clock {t}: started {running}"));
             self.seen_so_far.starts += u64::from(running);
             if running {
+                let mode = self.model.read(Register::Mode.address()).unwrap_or(0);
+                self.unlit = mode & mode::UNLIT != 0;
                 self.seen_so_far.cut += u64::from(self.cut());
             }
             self.seen_so_far.starts_refused += u64::from(!running);
         }
-        if was_lit && !self.model.lines().enable {
-            self.grace = STOP_CLOCKS;
+        if was_shown && !self.shows() {
+            self.grace = STOP_CLOCKS + self.lag();
             self.seen_so_far.stops += 1;
         }
-        let Seen { sample, leds, put_out } = self.seen[0];
+        let Seen { sample, mut leds, put_out } = self.seen[0];
+        // Without `enable` the other lines light nothing, and may follow a clock later.
+        if !leds.enable && !self.unlit {
+            if !std::mem::take(&mut self.just_lit) {
+                self.expect("lines without enable", &leds, &Lines::default());
+            }
+            leds = Lines::default();
+        }
+        self.just_lit |= leds.enable;
         let expected = self.model.lines();
-        if self.grace > 0 && !expected.enable {
+        if self.grace > 0 && !self.shows() {
             self.grace -= 1;
-            if !leds.enable {
+            // The lines of a pattern without light may all be 0.
+            if !leds.enable && !self.unlit {
                 self.grace = 0;
                 self.expect("LED lines going out", &leds, &expected);
             }
         } else if !put_out {
             self.expect("LED lines", &leds, &expected);
         }
-        let lit = self.model.lines().enable;
-        self.seen_so_far.lit_clocks += u64::from(lit);
+        let shown = self.shows();
+        self.seen_so_far.lit_clocks += u64::from(expected.enable);
+        self.seen_so_far.unlit_clocks += u64::from(shown && self.unlit);
         let running = self.model.running();
         self.model.tick(sample);
         // A run that ends by itself has switched its LEDs off already, unless its latency is 0.
-        if lit && running && !self.model.running() {
-            self.grace = TRIP_CLOCKS;
+        if shown && running && !self.model.running() {
+            self.grace = TRIP_CLOCKS + self.lag();
         }
+    }
+
+    /// Clocks by which the lines of a run without light go out later than its enable would.
+    fn lag(&self) -> u64 {
+        u64::from(self.unlit)
+    }
+
+    /// Whether the model shows a pattern, with light or without.
+    fn shows(&self) -> bool {
+        self.model.lines().enable || self.unlit && self.model.running()
     }
 
     fn access(&mut self, t: u64, access: Access) {

@@ -225,7 +225,8 @@ pub fn packets_with(rig: &mut Rig, seed: u64, bits: u32) {
     }
 }
 
-/// A scenario with these bits of `Mode`, and what comes before the start and before each action.
+/// A scenario with these bits of `Mode`, and what comes before the start and before each action. Every eighth is without
+/// light.
 fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
     let dice = &mut Dice::new(seed);
     rig.port = Port {
@@ -236,6 +237,7 @@ fn act(rig: &mut Rig, seed: u64, more: u32, mut before: impl FnMut(&mut Rig)) {
     };
     rig.over_range_rate = dice.pick(&[0, 1, 8, 64, 255]);
     rig.interlock(!dice.once_in(32));
+    let more = more | if seed % 8 == 6 { mode::UNLIT } else { 0 };
     let frame = set_up(rig, dice, more);
     before(rig);
     let start = if dice.once_in(5) { control::START_RAW } else { control::START };

@@ -15,6 +15,7 @@ pub struct Settings {
     pub differential: bool,
     pub alternating: bool,
     pub test_source: bool,
+    pub unlit: bool,
     pub packets: bool,
     pub narrow: bool,
     pub patterns: u64,
@@ -41,6 +42,7 @@ impl Default for Settings {
             differential: false,
             alternating: false,
             test_source: false,
+            unlit: false,
             packets: false,
             narrow: false,
             patterns: reset(Register::Patterns),
@@ -58,8 +60,8 @@ impl Default for Settings {
 }
 
 /// Bits of the fields of `types::Settings`.
-pub const SETTINGS: [usize; 27] =
-    [1, 1, 1, 1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
+pub const SETTINGS: [usize; 28] =
+    [1, 1, 1, 1, 1, 1, 1, 1, 1, 11, 10, 1, 16, 1, 16, 1, 6, 32, 32, 1, 32, 1, 1, 12, 27, 21, 1, 32];
 /// Bits of the fields of `types::Stamp`.
 pub const STAMP: [usize; 3] = [16, 64, 64];
 /// Bits of the fields of `types::Place`.
@@ -94,6 +96,7 @@ impl Settings {
             self.differential.into(),
             self.alternating.into(),
             self.test_source.into(),
+            self.unlit.into(),
             self.packets.into(),
             self.narrow.into(),
             self.patterns,

@@ -11,6 +11,7 @@ const TO_PINS: u64 = 6;
 laws![
     an_led_is_lit_where_the_hadamard_row_of_its_pattern_is_positive,
     light_is_told_apart_into_all_none_and_half,
+    a_run_without_light_shows_its_lines_and_lights_nothing,
     nothing_is_lit_in_the_clock_after_a_permission_is_withdrawn,
     a_halt_darkens_the_lines_at_once,
 ];
@@ -138,6 +139,29 @@ fn light_is_told_apart_into_all_none_and_half(project: &Project) {
         bench = run.bench;
     }
     assert!(all > 20, "{all}");
+}
+
+fn a_run_without_light_shows_its_lines_and_lights_nothing(project: &Project) {
+    let dice = &mut Dice::new(46);
+    let mut bench = Bench::new(project, "leds");
+    let mut lit = [0; 2];
+    for round in 0..20 {
+        let settings = Settings { unlit: round % 2 == 0, order_table: true, ..random(dice) };
+        let mut run = Run::start(bench, dice, settings);
+        for _ in 0..run.clocks() {
+            let shown = run.shown();
+            let seen = (run.bench.get("rows"), run.bench.get("columns"));
+            assert_eq!(seen, shown.map_or((0, 0), lines), "clock {} of {settings:?}", run.t);
+            let light = ["enable", "lit", "full", "dark"].map(|port| run.bench.is(port));
+            if settings.unlit {
+                assert_eq!(light, [false; 4], "clock {} of {settings:?}", run.t);
+            }
+            lit[round % 2] += u64::from(light[0]);
+            run.tick();
+        }
+        bench = run.bench;
+    }
+    assert!(lit[0] == 0 && lit[1] > 20, "{lit:?}");
 }
 
 fn nothing_is_lit_in_the_clock_after_a_permission_is_withdrawn(project: &Project) {

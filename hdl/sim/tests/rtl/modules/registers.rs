@@ -79,6 +79,7 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
         differential,
         alternating: differential && alternates,
         test_source: flag(dice),
+        unlit: flag(dice),
         packets: flag(dice),
         narrow: flag(dice),
         patterns: dice.pick(&[1, 2, 513, 1024]),
@@ -98,6 +99,7 @@ fn write_all(bench: &mut Bench, dice: &mut Dice) -> Settings {
         (settings.order_sequency, mode::ORDER_SEQUENCY),
         (settings.order_table, mode::ORDER_TABLE),
         (settings.test_source, mode::TEST_SOURCE),
+        (settings.unlit, mode::UNLIT),
         (settings.packets, mode::PACKETS),
         (settings.narrow, mode::NARROW),
     ];
@@ -160,7 +162,7 @@ fn every_setting_has_its_range(project: &Project) {
     let rest = u32::MAX;
     let raw = u32::from(RAW_SAMPLES_MAX);
     for (register, within, without) in [
-        (R::Mode, vec![0, 0x3F], vec![0x40, 1 << 31, rest]),
+        (R::Mode, vec![0, 0x3F, 0x1BF], vec![0x40, 1 << 9, 1 << 31, rest]),
         (R::Patterns, vec![1, 1024], vec![0, 1025, 2048, 1 << 16 | 1, rest]),
         // Values above the reset value of `Blank`.
         (R::Dwell, vec![3, 65_535], vec![0, 1, 2, 65_536, 1 << 16 | 5, rest]),
