@@ -98,6 +98,7 @@ impl Camera {
         ports: &mut Ports<'_, B, S, G>,
     ) {
         self.machine.step_run(now, ports.bus, ports.sink);
+        self.machine.step_training(now, ports.bus, ports.sink);
     }
 
     /// Forwards a time-of-flight map of `side` x `side` distances in mm, measured now. The map is
@@ -141,7 +142,7 @@ impl Camera {
     }
 
     /// Whether the board's own LED-enable pin may be high: from a configuration until a fault, the
-    /// end of the session, or a stop that the FPGA has not confirmed. The board sets the pin after every
+    /// end of the session, or a stop that the FPGA has not confirmed; and in a part of the self-test. The board sets the pin after every
     /// [`poll`](Self::poll) (`tests::model::every_reachable_state_keeps_the_laws_of_light`).
     #[must_use]
     pub fn may_light(&self) -> bool {

@@ -9,13 +9,14 @@
 
 use crate::machine::{Activity, Machine, Session};
 use crate::notices::{Notice, Outcome};
+use crate::training::Port;
 use crate::{
     FpgaBus, GatewareLoader, Inputs, Micros, PacketSink, Ports, configure, fpga, gateware, safety,
 };
 use nirspi_wire::register::{Design, NO_CLOCK, ORDER_TABLE, Register, status};
 use nirspi_wire::{
-    Answer, Capabilities, Command, Configuration, GatewareChunk, PATTERNS, PatternOrder, Refusal,
-    Request, State, Status, version,
+    Answer, Capabilities, Command, Configuration, Fault, GatewareChunk, PATTERNS, PatternOrder,
+    Refusal, Request, State, Status, version,
 };
 
 impl Machine {
@@ -111,6 +112,10 @@ impl Machine {
         if let Some(fault) = safety::objection(inputs, &self.limits, self.fault) {
             return Err(Refusal::Fault(fault));
         }
+        // No configuration shows that the cause of these is gone.
+        if let Some(fault @ (Fault::BoardEnableStuck | Fault::FpgaEnableStuck)) = self.fault {
+            return Err(Refusal::Fault(fault));
+        }
         let mut acknowledged = fpga::acknowledge(bus);
         if acknowledged.is_ok() && self.fault == Some(fpga::WRONG_CLOCK) {
             acknowledged = fpga::check_clock(bus);
@@ -133,6 +138,10 @@ impl Machine {
         table.and_then(|()| fpga::set(bus, &setup, &self.limits)).map_err(|_| Refusal::Bus)?;
         self.setup = Some(setup);
         self.fault = None;
+        // The packet port is tried before the host's next command.
+        if let Port::Unknown(due) = &mut self.port {
+            *due = now;
+        }
         Ok(())
     }
 
@@ -179,6 +188,7 @@ impl Machine {
         let next_offset = gateware::take(&mut self.loading, chunk, loader)?;
         // The first piece makes the FPGA forget its settings.
         self.setup = None;
+        self.port = Port::Unknown(Micros(0));
         Ok(next_offset)
     }
 }

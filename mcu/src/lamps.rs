@@ -70,5 +70,7 @@ pub const fn flashes(fault: Fault) -> u8 {
         Fault::FpgaStalled => 8,
         Fault::FpgaWatchdog => 9,
         Fault::HostSilent => 10,
+        Fault::BoardEnableStuck => 11,
+        Fault::FpgaEnableStuck => 12,
     }
 }

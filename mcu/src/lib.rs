@@ -2,7 +2,8 @@
 //!
 //! Each module has one idea. `camera` is what a board calls; `commands` (of the host) and `poll`
 //! (safety rules, then one step) drive the `machine`, which holds the state. The parts of the
-//! machine do not use the machine: `run` and `burst` (data), `selftest`, `gateware`, `configure`
+//! machine do not use the machine: `run` and `burst` (data), `selftest`, `enables` and `training`, which share `test_frame`,
+//! `gateware`, `configure`
 //! (checks), `safety` (sensors), `ring` (what the FPGA's parallel port has sent), `meter` (signal and noise), `fpga` (registers), `notices` (replies and events that wait for
 //! the link), `packets` (a message into the link). `host_port` says which bytes a board transfers,
 //! `patience` how long a transfer to the host may wait, `lamps` what the board shows to somebody beside it.
@@ -29,6 +30,7 @@ mod commands;
 mod configure;
 mod crash;
 pub mod ecp5;
+mod enables;
 mod float;
 mod fpga;
 mod gateware;
@@ -50,7 +52,9 @@ mod run;
 mod safety;
 mod selftest;
 pub mod staging;
+mod test_frame;
 mod time;
+mod training;
 
 #[cfg(test)]
 mod tests;

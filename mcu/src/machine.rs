@@ -1,6 +1,6 @@
 //! The state of the camera, and every change of it that switches LEDs, answers a command or reports an event.
 //!
-//! A busy part (a run, a raw burst, a test frame) returns the outcome of its step, and the machine
+//! A busy part (a run, a raw burst, a test frame, a test of the enables, a training) returns the outcome of its step, and the machine
 //! acts on the outcome. The parts do not use the machine, so each part can be read and tested
 //! alone.
 //!
@@ -11,12 +11,17 @@
 
 use crate::burst::{self, Burst};
 use crate::configure::Setup;
+use crate::enables::{self, Enables};
 use crate::gateware::Loading;
 use crate::meter::Meter;
 use crate::notices::{Notice, Notices, Outcome};
 use crate::run::{self, Counters, Fpga, Run, SAMPLE_BYTES};
 use crate::selftest::{self, TestFrame};
-use crate::{BoardInfo, Crash, FpgaBus, Inputs, Limits, Micros, PacketSink, fpga, safety};
+use crate::training::{self, Port, Training};
+use crate::{
+    BoardInfo, Crash, FpgaBus, Inputs, Limits, Micros, PacketSink, fpga, safety, test_frame,
+};
+use nirspi_wire::register::{Design, Register, status};
 use nirspi_wire::{Answer, Event, EventKind, Fault, RebootInto, Refusal, RunLength, State};
 
 /// State of the session with the host.
@@ -39,6 +44,8 @@ pub(crate) enum Activity {
     Run(Run),
     Burst(Burst),
     TestFrame(TestFrame),
+    Enables(Enables),
+    Training(Training),
 }
 
 /// The whole camera except the bytes of a half-received command.
@@ -56,6 +63,8 @@ pub(crate) struct Machine {
     pub counters: Counters,
     pub meter: Meter,
     pub loading: Option<Loading>,
+    /// Whether packets are known to come whole over the packet port.
+    pub port: Port,
     pub reboot: Option<RebootInto>,
     /// The crash that ended the last start, until a host has got the crash report.
     pub crash: Option<Crash>,
@@ -91,6 +100,7 @@ impl Machine {
             counters: Counters::default(),
             meter: Meter::new(),
             loading: None,
+            port: Port::Unknown(Micros(0)),
             reboot: None,
             crash: None,
             clock_counts: false,
@@ -106,17 +116,27 @@ impl Machine {
     }
 
     pub fn state(&self) -> State {
+        // Nothing of a training shows: the FPGA has no light meanwhile.
         match (&self.fault, &self.activity, &self.setup) {
             (Some(_), ..) => State::Fault,
-            (None, Activity::Resting, Some(_)) => State::Configured,
-            (None, Activity::Resting, None) => State::Idle,
+            (None, Activity::Resting | Activity::Training(_), Some(_)) => State::Configured,
+            (None, Activity::Resting | Activity::Training(_), None) => State::Idle,
             (None, ..) => State::Running,
         }
     }
 
     /// Whether the board's LED-enable pin may be high.
     pub fn may_light(&self) -> bool {
-        !self.off_pending && matches!(self.state(), State::Configured | State::Running)
+        if self.off_pending || self.fault.is_some() {
+            return false;
+        }
+        match &self.activity {
+            Activity::Resting | Activity::Training(_) | Activity::TestFrame(_) => {
+                self.setup.is_some()
+            }
+            Activity::Run(_) | Activity::Burst(_) => true,
+            Activity::Enables(enables) => enables.pin(),
+        }
     }
 
     /// The configuration for a start, if nothing forbids a start.
@@ -170,11 +190,16 @@ impl Machine {
             self.fault = Some(fault);
             self.notify(now, EventKind::Fault(fault));
         }
+        if matches!(fault, Fault::FpgaAbsent { .. }) {
+            self.port = Port::Unknown(now);
+        }
         match &mut self.activity {
             Activity::Resting => {}
             Activity::Run(run) => run.end(now, None),
             Activity::Burst(_) => self.activity = Activity::Resting,
             Activity::TestFrame(_) => self.finish_test(false, bus),
+            Activity::Enables(_) => self.finish_enables(now, enables::Verdict::NoFrame, bus),
+            Activity::Training(_) => self.rest(bus),
         }
     }
 
@@ -312,7 +337,7 @@ impl Machine {
             return self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
         }
         let test = TestFrame::new(id, report, now);
-        let begun = selftest::begin(bus, &self.limits);
+        let begun = test_frame::begin(bus, &test_frame::GENERATOR, &self.limits);
         self.activity = Activity::TestFrame(test);
         self.release_pending = false;
         if !begun {
@@ -324,14 +349,98 @@ impl Machine {
     pub fn step_test(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
         let Activity::TestFrame(test) = &self.activity else { return false };
         let Some(passed) = test.step(now, bus) else { return false };
-        self.finish_test(passed, bus);
+        // The bring-up design has no LEDs, and sees the levels of its own pins.
+        if passed && fpga::design(bus) == Ok(Design::Camera) {
+            let (id, report) = test.verdict(passed);
+            self.activity = Activity::Enables(Enables::new(id, report, now));
+        } else {
+            self.finish_test(passed, bus);
+        }
         true
     }
 
-    /// Switches the LEDs off, restores the configuration, and replies.
     fn finish_test(&mut self, passed: bool, bus: &mut impl FpgaBus) {
         let Activity::TestFrame(test) = &self.activity else { return };
         let (id, report) = test.verdict(passed);
+        self.rest(bus);
+        self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+    }
+
+    /// Goes on with the test of the LED enables.
+    pub fn step_enables(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
+        let Activity::Enables(enables) = &mut self.activity else { return false };
+        let Some(verdict) = enables.step(now, bus, &self.limits) else { return false };
+        self.finish_enables(now, verdict, bus);
+        true
+    }
+
+    fn finish_enables(&mut self, now: Micros, verdict: enables::Verdict, bus: &mut impl FpgaBus) {
+        let Activity::Enables(enables) = &self.activity else { return };
+        let (id, report) = enables.verdict(verdict);
+        self.rest(bus);
+        if let enables::Verdict::Stuck(fault) = verdict {
+            self.trip(now, fault, bus);
+        }
+        self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+    }
+
+    /// Begins a training if one is due and nothing forbids a start; true if it has begun.
+    pub fn start_training(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
+        let Port::Unknown(due) = self.port else { return false };
+        let may_start = matches!(self.activity, Activity::Resting)
+            && now >= due
+            && self.fault.is_none()
+            && !self.off_pending
+            && !self.is_loading()
+            && self.reboot.is_none();
+        if !may_start {
+            return false;
+        }
+        self.port = Port::Unknown(Micros(now.0.saturating_add(self.limits.resting_check.0)));
+        let ready = fpga::design(bus).is_ok()
+            && fpga::health(bus).is_ok_and(|status| status & status::INTERLOCK_CLOSED != 0);
+        if !ready {
+            return false;
+        }
+        self.release_pending = false;
+        self.activity = Activity::Training(Training::new(now));
+        if !training::start(bus, now, &self.limits) {
+            self.rest(bus);
+            return false;
+        }
+        true
+    }
+
+    /// Compares the packet of the training if it has come.
+    pub fn step_training(
+        &mut self,
+        now: Micros,
+        bus: &mut impl FpgaBus,
+        sink: &mut impl PacketSink,
+    ) -> bool {
+        let Activity::Training(training) = &mut self.activity else { return false };
+        let Some(verdict) = training.step(now, bus, sink) else { return false };
+        let is_ready = bus.frame_ready();
+        // A line that is low although the FPGA has the packet is a broken wire.
+        let is_told =
+            fpga::read(bus, Register::Status).is_ok_and(|status| status & status::FRAME_READY != 0);
+        self.rest(bus);
+        match verdict {
+            training::Verdict::Sound => self.port = Port::Sound,
+            training::Verdict::Damaged => self.trip(now, fpga::UNREADABLE, bus),
+            training::Verdict::Late if is_told && !is_ready => {
+                self.trip(now, Fault::FpgaStalled, bus);
+            }
+            training::Verdict::Late => {}
+        }
+        if let Port::Unknown(due) = &mut self.port {
+            *due = Micros(now.0.saturating_add(self.limits.resting_check.0));
+        }
+        true
+    }
+
+    /// Ends a run of the firmware's own: stops it, gives back its frame, and restores the configuration.
+    fn rest(&mut self, bus: &mut impl FpgaBus) {
         self.activity = Activity::Resting;
         self.leds_off(bus);
         self.release_pending = fpga::release(bus).is_err();
@@ -340,7 +449,6 @@ impl Machine {
         {
             self.setup = None;
         }
-        self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
     }
 
     /// Whether a host is loading a bitstream, so that the FPGA may have no host port.

@@ -38,10 +38,12 @@ impl Machine {
         self.tell_damage(now, *bus);
         let mut worked = self.flush(*sink);
         worked |= match self.activity {
-            Activity::Resting => false,
+            Activity::Resting => self.start_training(now, *bus),
             Activity::Run(_) => self.step_run(now, *bus, *sink),
             Activity::Burst(_) => self.step_burst(now, *bus, *sink),
             Activity::TestFrame(_) => self.step_test(now, *bus),
+            Activity::Enables(_) => self.step_enables(now, *bus),
+            Activity::Training(_) => self.step_training(now, *bus, *sink),
         };
         worked |= self.flush(*sink);
 
@@ -58,7 +60,11 @@ impl Machine {
     }
 
     fn guard_host(&mut self, now: Micros, bus: &mut impl FpgaBus) {
-        let lit = matches!(&self.activity, Activity::Run(run) if run.is_lit());
+        let lit = match &self.activity {
+            Activity::Run(run) => run.is_lit(),
+            Activity::Enables(_) => true,
+            _ => false,
+        };
         if lit && now.since(self.last_command) > self.limits.host_silence {
             self.trip(now, Fault::HostSilent, bus);
         }
@@ -101,7 +107,10 @@ impl Machine {
                     self.leds_off(bus);
                 }
             }
-            Activity::Burst(_) | Activity::TestFrame(_) => {}
+            Activity::Burst(_)
+            | Activity::TestFrame(_)
+            | Activity::Enables(_)
+            | Activity::Training(_) => {}
         }
     }
 
@@ -118,12 +127,12 @@ impl Machine {
     }
 
     /// Whether a command can be taken. No command is taken while a reply waits for the end of a
-    /// run, a test frame or a restart.
+    /// run, a self-test or a restart, nor during the training.
     pub fn takes_commands(&self) -> bool {
         let busy = match &self.activity {
             Activity::Resting | Activity::Burst(_) => false,
             Activity::Run(run) => !run.is_lit(),
-            Activity::TestFrame(_) => true,
+            Activity::TestFrame(_) | Activity::Enables(_) | Activity::Training(_) => true,
         };
         !busy && self.reboot.is_none() && self.notices.has_room_for_a_command()
     }

@@ -2,38 +2,19 @@
 //!
 //! # Invariant
 //! A self-test leaves the configuration as it was
-//! (`tests::selftest::a_good_device_passes_everything_in_any_resting_state`), and lights the array
-//! for no more than one sweep, which takes 82 microseconds
-//! (`tests::selftest::the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile`).
+//! (`tests::selftest::a_good_device_passes_everything_in_any_resting_state`). Its test frame is one sweep of the FPGA's test
+//! generator, which takes 82 microseconds, without light
+//! (`tests::selftest::the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile`). The array is lit by the test of its
+//! [`enables`](crate::enables) alone, half of 0.3 milliseconds.
 //!
-//! The FPGA drives the LEDs in every run, so the test frame cannot be dark. The test frame is one
-//! sweep at the fastest rate, each pattern followed by its complement, so every LED is lit for half
-//! of 82 microseconds. The test frame is left out (not in [`SelfTestReport::ran`]) if a fault is
-//! latched, a sensor forbids light, the bus has failed, or a bitstream is being loaded: meanwhile no
-//! poll repeats a stop that was lost.
+//! Test frame and enables are left out (not in [`SelfTestReport::ran`]) if a fault is latched, a sensor forbids light, the
+//! bus has failed, or a bitstream is being loaded: meanwhile no poll repeats a stop that was lost.
 
-use crate::configure::Setup;
+use crate::test_frame::{GENERATOR, GENERATOR_FLAGS, expected_sums, look};
 use crate::{BusError, FpgaBus, Inputs, Limits, Micros, fpga, safety};
-use nirspi_wire::fpga::{FpgaFrame, Sums};
-use nirspi_wire::register::{Register, TEST_SEED, clocks, control, mode, status, test_sample};
-use nirspi_wire::{CLOCKS_PER_PATTERN, FrameFlags, PATTERNS, SelfTestReport};
-
-/// Longest time that the test frame may take. The frame needs 82 microseconds and a transfer.
-const TEST_PATIENCE: Micros = Micros(100_000);
-
-/// Every pattern and its complement, so that every accumulator of the FPGA takes part.
-const TEST_SETUP: Setup = Setup {
-    mode: mode::DIFFERENTIAL | mode::TEST_SOURCE,
-    patterns: PATTERNS,
-    dwell: CLOCKS_PER_PATTERN,
-    blank: 2,
-    latency: 3,
-    sweeps: 1,
-    over_range_trip: 0,
-    duty_permille: 500,
-};
-
-const TEST_FLAGS: FrameFlags = FrameFlags::TEST_SOURCE.with(FrameFlags::DIFFERENTIAL);
+use nirspi_wire::SelfTestReport;
+use nirspi_wire::fpga::FpgaFrame;
+use nirspi_wire::register::{Register, clocks, status};
 
 /// A test frame in progress.
 #[derive(Debug)]
@@ -132,39 +113,12 @@ fn holds(memory: &mut (impl Cells + ?Sized), pattern: impl Fn(usize) -> u8) -> b
     memory.reads(pattern)
 }
 
-/// The expected sums of the test frame.
-pub(crate) fn expected_sums() -> impl Iterator<Item = Sums> {
-    let mut state = TEST_SEED;
-    let mut sample = move || {
-        let this = state;
-        state = test_sample(state);
-        u64::from(this)
-    };
-    // A sample before the arrival of the first light belongs to no slot.
-    for _ in 0..TEST_SETUP.latency {
-        sample();
-    }
-    let mut slot = move || {
-        let blanked = (0..TEST_SETUP.blank).map(|_| sample()).map(|_| 0);
-        let blanked: u64 = blanked.sum();
-        (TEST_SETUP.blank..TEST_SETUP.dwell).fold(blanked, |sum, _| sum.saturating_add(sample()))
-    };
-    (0..TEST_SETUP.patterns).map(move |_| Sums { positive: slot(), negative: slot() })
-}
-
 fn is_the_test_frame(bytes: &[u8]) -> bool {
     FpgaFrame::parse(bytes).is_ok_and(|frame| {
-        frame.header.sweeps == TEST_SETUP.sweeps
-            && frame.header.flags == TEST_FLAGS
+        frame.header.sweeps == GENERATOR.sweeps
+            && frame.header.flags == GENERATOR_FLAGS
             && frame.sums().eq(expected_sums())
     })
-}
-
-/// Starts the test frame; true if the FPGA accepted the start. The LEDs may be on in both cases.
-pub(crate) fn begin(bus: &mut impl FpgaBus, limits: &Limits) -> bool {
-    fpga::set(bus, &TEST_SETUP, limits).is_ok()
-        && fpga::write(bus, Register::Frames, 1).is_ok()
-        && fpga::start(bus, control::START).is_ok()
 }
 
 impl TestFrame {
@@ -181,12 +135,7 @@ impl TestFrame {
 
     /// Whether the test frame was right; `None` while the frame may still come.
     pub fn step(&self, now: Micros, bus: &mut impl FpgaBus) -> Option<bool> {
-        let late = now.since(self.since) > TEST_PATIENCE;
-        match bus.frame_ready().then(|| bus.frame().map(|b| b.map(is_the_test_frame))) {
-            None | Some(Ok(None)) if !late => None,
-            Some(Ok(Some(passed))) => Some(passed),
-            _ => Some(false),
-        }
+        Some(look(now, self.since, bus, is_the_test_frame)?.unwrap_or(false))
     }
 
     /// The number of the command to answer, and the whole report.
@@ -200,12 +149,13 @@ impl TestFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_frame;
     use crate::tests::fake_fpga::FakeFpga;
 
     #[test]
     fn a_test_frame_passes_when_it_comes_and_fails_when_it_is_late() {
         let (mut bus, limits) = (FakeFpga::default(), Limits::default());
-        assert!(begin(&mut bus, &limits));
+        assert!(test_frame::begin(&mut bus, &GENERATOR, &limits));
         let test = TestFrame::new(7, SelfTestReport::default(), Micros(0));
         assert_eq!(test.step(Micros(1), &mut bus), None);
         assert_eq!(test.step(Micros(200_000), &mut bus), Some(false), "late");

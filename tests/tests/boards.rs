@@ -467,6 +467,8 @@ fn troubleshooting_lists_every_fault_with_the_flashes_of_its_lamp() {
         Fault::FpgaStalled,
         Fault::FpgaWatchdog,
         Fault::HostSilent,
+        Fault::BoardEnableStuck,
+        Fault::FpgaEnableStuck,
     ];
     let page = read("docs/troubleshooting.md");
     let (_, table) = page.split_once("| the line says | red flashes |").expect("a table of faults");

@@ -30,6 +30,7 @@ const SILENCE: Duration = Duration::from_millis(20);
 pub struct Tunnel<'b> {
     uart: &'static Uart,
     lines: &'b Cell<Lines>,
+    board_enable: &'b Cell<bool>,
     number: u8,
     look: Option<Look>,
     patience: Duration,
@@ -44,11 +45,13 @@ struct Look {
 }
 
 impl<'b> Tunnel<'b> {
-    /// A tunnel over this UART. Readings of the sensors are written to `lines`.
-    pub fn new(uart: &'static Uart, lines: &'b Cell<Lines>) -> Self {
+    /// A tunnel over this UART. Readings of the sensors are written to `lines`, and each access tells the level of the
+    /// board's LED enable.
+    pub fn new(uart: &'static Uart, lines: &'b Cell<Lines>, board_enable: &'b Cell<bool>) -> Self {
         // A crash may have left half a request.
         uart.quieten(SILENCE);
-        let mut tunnel = Self { uart, lines, number: 0, look: None, patience: PATIENCE };
+        let mut tunnel =
+            Self { uart, lines, board_enable, number: 0, look: None, patience: PATIENCE };
         tunnel.begin_look();
         // A missing answer leaves no FPGA, no interlock and no sensor, and the camera reports that.
         let _ = tunnel.end_look();
@@ -57,7 +60,8 @@ impl<'b> Tunnel<'b> {
 
     fn next(&mut self, opcode: u8, address: u16, argument: u32) -> Request {
         self.number = self.number.wrapping_add(1);
-        Request { opcode, number: self.number, address, argument }
+        let board_enable = self.board_enable.get();
+        Request { opcode, number: self.number, address, argument, board_enable }
     }
 
     /// Takes the lines of a correct reply.

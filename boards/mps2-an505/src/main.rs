@@ -94,9 +94,10 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     SCB::sys_reset()
 }
 
-/// A board without pins.
+/// A board without pins: the tunnel carries the levels.
 struct Emulated {
     lines: &'static Cell<Lines>,
+    enable: &'static Cell<bool>,
 }
 
 impl Board for Emulated {
@@ -105,7 +106,9 @@ impl Board for Emulated {
         Inputs { interlock_closed, temperature_centi_celsius }
     }
 
-    fn enable_leds(&mut self, _enabled: bool) {}
+    fn enable_leds(&mut self, enabled: bool) {
+        self.enable.set(enabled);
+    }
 
     fn show(&mut self, _lamps: Lamps) {}
 
@@ -123,7 +126,7 @@ async fn camera(board: Emulated, link: CameraEnd<'static>) -> ! {
         ConstStaticCell::new([0; MAX_FRAME_BYTES]);
     static DEPTH: StaticCell<DepthMailbox> = StaticCell::new();
     let device = Device {
-        port: Tunnel::new(&FPGA, board.lines),
+        port: Tunnel::new(&FPGA, board.lines, board.enable),
         board,
         frame: FRAME.take(),
         loader: NoLoader,
@@ -159,6 +162,7 @@ fn main() -> ! {
         ConstStaticCell::new([Packet::EMPTY; PACKETS]);
     static LINK: StaticCell<Link<'static>> = StaticCell::new();
     static LINES: StaticCell<Cell<Lines>> = StaticCell::new();
+    static ENABLE: StaticCell<Cell<bool>> = StaticCell::new();
 
     if let Some(mut peripherals) = Peripherals::take() {
         clock::start(&mut peripherals);
@@ -178,11 +182,12 @@ fn main() -> ! {
     }
     let link = LINK.init(Link::new(PLACES.take()));
     let lines = LINES.init(Cell::new(Lines::default()));
+    let enable = ENABLE.init(Cell::new(false));
     let (camera_end, from_host, to_host) = link.split();
     executor::run(|spawner: Spawner| {
         // Each task is spawned once, so there is room.
         if let (Ok(camera), Ok(host)) =
-            (camera(Emulated { lines }, camera_end), host(from_host, to_host))
+            (camera(Emulated { lines, enable }, camera_end), host(from_host, to_host))
         {
             spawner.spawn(camera);
             spawner.spawn(host);

@@ -50,6 +50,10 @@ impl<F: SimulatedFpga> SimulatedFpga for Logged<F> {
         self.fpga.set_interlock(closed);
         self.look();
     }
+
+    fn set_board_enable(&mut self, high: bool) {
+        self.fpga.set_board_enable(high);
+    }
 }
 
 impl<F: SimulatedFpga> FpgaBus for Logged<F> {

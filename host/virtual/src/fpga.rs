@@ -25,6 +25,17 @@ pub trait SimulatedFpga: FpgaBus + Send {
     fn running(&self) -> bool;
     /// Opens or closes the interlock input.
     fn set_interlock(&mut self, closed: bool);
+    /// Sets the level of the board's own LED enable, which the array joins with the FPGA's by an AND gate.
+    fn set_board_enable(&mut self, high: bool);
+}
+
+/// One of the two LED enables, which is high whatever its chip says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StuckEnable {
+    /// The FPGA's.
+    Fpga,
+    /// The board's.
+    Board,
 }
 
 /// The LED array's answer to the lines of the FPGA: its settled light in electrons a sample.
@@ -53,6 +64,9 @@ struct Detector {
     shown: Option<Lines>,
     /// Whether there was light since the chain has rested.
     lit: bool,
+    /// Level of the board's LED enable. High until a board sets it, for tests of the FPGA alone.
+    board_enable: bool,
+    stuck: Option<StuckEnable>,
 }
 
 impl Detector {
@@ -60,7 +74,16 @@ impl Detector {
     fn new(array: LedArray, chain: Chain) -> Self {
         let mut gateware = Gateware::new();
         gateware.set_interlock(true);
-        Self { gateware, array, chain, shown: None, lit: false }
+        Self { gateware, array, chain, shown: None, lit: false, board_enable: true, stuck: None }
+    }
+
+    /// The lines as the LEDs have them, behind the gate of the two enables.
+    #[inline(always)]
+    fn lines(&self) -> Lines {
+        let lines = self.gateware.lines();
+        let fpga = lines.enable || self.stuck == Some(StuckEnable::Fpga);
+        let board = self.board_enable || self.stuck == Some(StuckEnable::Board);
+        Lines { enable: fpga && board, ..lines }
     }
 
     /// Changes what is in front of the LEDs.
@@ -109,10 +132,10 @@ impl Detector {
     #[inline(always)]
     fn advance_with(&mut self, clocks: u64, sample: impl Fn(&mut Self, Lines) -> AdcSample) {
         for _ in 0..clocks {
-            // The ADC is not read outside a run, and drawing its noise is most of the work.
-            let sample = if self.gateware.running() {
+            // The ADC is not read outside a run nor in one of the test generator, and drawing its noise is most of the work.
+            let sample = if self.gateware.reads_adc() {
                 self.lit = true;
-                sample(self, self.gateware.lines())
+                sample(self, self.lines())
             } else {
                 self.rest();
                 DARK
@@ -219,12 +242,20 @@ impl OpticalFpga {
     /// Whether the FPGA lets LEDs shine now.
     #[must_use]
     pub fn leds_on(&self) -> bool {
-        self.lines().enable
+        self.detector.gateware.lines().enable
     }
 
-    /// The levels at the LED pins.
-    fn lines(&self) -> Lines {
-        self.detector.gateware.lines()
+    /// Whether LEDs can shine now: whether both enables are high, or look so.
+    #[must_use]
+    pub fn shines(&self) -> bool {
+        self.detector.lines().enable
+    }
+
+    /// The same camera with an LED enable that is stuck high.
+    #[must_use]
+    pub fn stuck(mut self, enable: StuckEnable) -> Self {
+        self.detector.stuck = Some(enable);
+        self
     }
 
     /// The same camera with another frequency of the ADC's clock in Hz; `None` is no clock at all.
@@ -236,9 +267,10 @@ impl OpticalFpga {
 
     /// The sample of a clock in a run.
     fn sample(&mut self) -> AdcSample {
-        let lines = self.lines();
+        let lines = self.detector.lines();
         if let Some(late) = &mut self.loopback {
-            late.push_back(lines);
+            // The design sees the levels of its own pins.
+            late.push_back(self.detector.gateware.lines());
             let seen = late.pop_front().unwrap_or_default();
             let code = loopback(seen.rows, seen.columns, seen.enable);
             return AdcSample { code, over_range: false };
@@ -254,7 +286,8 @@ impl OpticalFpga {
 
     /// One clock.
     fn tick(&mut self) {
-        let sample = if self.running() {
+        let gateware = &self.detector.gateware;
+        let sample = if gateware.reads_adc() || self.loopback.is_some() && gateware.running() {
             self.detector.lit = true;
             self.sample()
         } else {
@@ -324,6 +357,10 @@ impl SimulatedFpga for OpticalFpga {
 
     fn set_interlock(&mut self, closed: bool) {
         self.detector.gateware.set_interlock(closed);
+    }
+
+    fn set_board_enable(&mut self, high: bool) {
+        self.detector.board_enable = high;
     }
 }
 

@@ -28,7 +28,7 @@ mod stages;
 mod tunnel;
 pub mod weather;
 
-pub use fpga::{Front, OpticalFpga, SimulatedFpga, Wiring};
+pub use fpga::{Front, OpticalFpga, SimulatedFpga, StuckEnable, Wiring};
 pub use link::MemoryLink;
 pub use look::{Bench, Calibrated, Look, LookError, Seen, SeenImage, SeenPicture};
 pub use model::{CameraFileError, read_camera_model};
@@ -197,6 +197,12 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
             &mut Ports { bus: &mut self.fpga, sink: &mut self.packets, loader: &mut self.loader };
         let taken = self.camera.receive(now, &self.inbox, &self.inputs, ports);
         self.inbox.drain(..taken);
+        self.set_pin();
+    }
+
+    /// The board sets its LED enable as the firmware says.
+    fn set_pin(&mut self) {
+        self.fpga.set_board_enable(self.camera.may_light());
     }
 
     /// Advances the time by `clocks` ADC clocks, then polls the firmware once. Returns whether the
@@ -205,8 +211,16 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         self.fpga.advance(clocks);
         let now = self.now();
         if self.loader.step(now) {
+            self.fpga.set_board_enable(false);
             return true;
         }
+        let worked = self.turn(now);
+        self.set_pin();
+        worked
+    }
+
+    /// A turn of the firmware's loop.
+    fn turn(&mut self, now: Micros) -> bool {
         let ports =
             &mut Ports { bus: &mut self.fpga, sink: &mut self.packets, loader: &mut self.loader };
         // Bytes are received before the poll, because the poll measures how long the host has been
@@ -242,6 +256,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
         let ports =
             &mut Ports { bus: &mut self.fpga, sink: &mut self.packets, loader: &mut self.loader };
         self.camera.link_closed(now, ports);
+        self.set_pin();
         self.inbox.clear();
         self.packets.clear();
     }
@@ -251,6 +266,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
     pub fn with_limits(mut self, limits: Limits) -> Self {
         self.limits = limits;
         self.camera = Camera::new(self.info.clone(), limits);
+        self.set_pin();
         self
     }
 
@@ -264,6 +280,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
     /// The firmware starts as after power-up, and its link with it. The FPGA notices nothing.
     pub fn power_up(&mut self) {
         self.camera = Camera::new(self.info.clone(), self.limits);
+        self.set_pin();
         self.inbox.clear();
         self.packets.clear();
     }

@@ -176,6 +176,10 @@ impl<F: SimulatedFpga> SimulatedFpga for PrecomputedFpga<F> {
     fn set_interlock(&mut self, closed: bool) {
         self.model.set_interlock(closed);
     }
+
+    fn set_board_enable(&mut self, high: bool) {
+        self.model.set_board_enable(high);
+    }
 }
 
 impl<F: SimulatedFpga> FpgaBus for PrecomputedFpga<F> {

@@ -53,6 +53,7 @@ pub fn serve_tunnel(
             };
             buffer.drain(..REQUEST_BYTES);
             fpga.set_interlock(interlock_closed.load(Ordering::Relaxed));
+            fpga.set_board_enable(request.board_enable);
             let data = access(fpga, request);
             let lines = Lines {
                 frame_ready: fpga.frame_ready(),

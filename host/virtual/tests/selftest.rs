@@ -9,7 +9,9 @@ use nirspi::session::Session;
 use nirspi_hdl_model::Lines;
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::{CameraModel, LedArray, Scene};
-use nirspi_virtual::{MemoryLink, OpticalFpga, SimulatedFpga, VirtualCamera, VirtualOptics};
+use nirspi_virtual::{
+    MemoryLink, OpticalFpga, SimulatedFpga, StuckEnable, VirtualCamera, VirtualOptics,
+};
 use nirspi_wire::register::{Register, mode};
 use nirspi_wire::{Answer, DeviceMessage, Reply, Status, encode, open};
 use std::collections::{HashMap, HashSet};
@@ -88,6 +90,50 @@ fn a_missing_adc_clock_is_the_one_failure_and_says_what_to_check() {
     only(&found, "device: ADC clock", &["0.00 MHz", "xpected 125 MHz", "supply"]);
     let slow = test(plugged(optics().fpga(1).unwrap().adc_clock(Some(62_500_000))));
     only(&slow, "device: ADC clock", &["62.50 MHz", "sample clock"]);
+}
+
+/// The camera works on with the other enable, so nothing else shows it. What needs light is refused afterwards.
+#[test]
+fn a_stuck_led_enable_is_named_and_forbids_light() {
+    for (stuck, name, words) in [
+        (StuckEnable::Board, "device: board's LED enable", "while the board's LED enable is low"),
+        (StuckEnable::Fpga, "device: FPGA's LED enable", "while the FPGA's LED enable is low"),
+    ] {
+        let found = test(plugged(optics().fpga(1).unwrap().stuck(stuck)));
+        let failed = failures(&found);
+        assert_eq!(failed[0].name(), name, "{failed:#?}");
+        assert!(failed.iter().all(|check| check.note().contains(words)), "{failed:#?}");
+        assert!(failed.len() > 1 && found.settling.is_none(), "{failed:#?}");
+    }
+    let found = test(MemoryLink::new(optics().camera(1).unwrap()));
+    for name in ["device: board's LED enable", "device: FPGA's LED enable"] {
+        assert_eq!(note(&found, name), "dark while it alone is low");
+    }
+}
+
+/// The light of an ordinary target is enough to judge by, noise and daylight too, and so is a twentieth of a sheet's.
+#[test]
+fn the_enables_are_judged_by_a_dim_light_too_and_not_without_light() {
+    let names = ["device: board's LED enable", "device: FPGA's LED enable"];
+    let verdicts = |share: f32| {
+        let found =
+            wired(move |array, lines| share * array.light(lines.rows, lines.columns, lines.enable));
+        names.map(|name| found.checks.iter().find(|check| check.name() == name).unwrap().verdict())
+    };
+    assert_eq!(verdicts(0.05), [Verdict::Passed; 2]);
+    assert_eq!(verdicts(0.0), [Verdict::Skipped; 2]);
+}
+
+/// A camera with a stuck enable measures as any other until its self-test: that is what makes the fault latent.
+#[test]
+fn a_stuck_led_enable_shows_nowhere_else() {
+    let sound = optics().fpga(1).unwrap();
+    let stuck = optics().fpga(1).unwrap().stuck(StuckEnable::Board);
+    let [sound, stuck] = [sound, stuck].map(|fpga| {
+        let mut session = Session::open(Box::new(plugged(fpga))).unwrap();
+        nirspi::calibration::calibrate(&mut session, &mut nirspi::session::IgnorePackets).unwrap()
+    });
+    assert_eq!((sound.adc_latency, sound.step_counts), (stuck.adc_latency, stuck.step_counts));
 }
 
 #[test]
@@ -237,6 +283,9 @@ impl<W: FnMut(Register, u32) -> u32 + Send> SimulatedFpga for Tampered<W> {
     fn set_interlock(&mut self, closed: bool) {
         self.inner.set_interlock(closed);
     }
+    fn set_board_enable(&mut self, high: bool) {
+        self.inner.set_board_enable(high);
+    }
 }
 
 #[test]
@@ -382,6 +431,9 @@ impl SimulatedFpga for Busy {
     }
     fn set_interlock(&mut self, closed: bool) {
         self.inner.set_interlock(closed);
+    }
+    fn set_board_enable(&mut self, high: bool) {
+        self.inner.set_board_enable(high);
     }
 }
 

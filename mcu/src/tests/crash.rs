@@ -33,6 +33,7 @@ fn crashed() -> Bench {
     let info = BoardInfo::new("bench", "0001", Version(1, 2, 3));
     bench.camera = Camera::new(info, Limits::default());
     bench.camera.restarted_after(crash());
+    bench.train();
     bench
 }
 

@@ -56,6 +56,16 @@ pub struct FakeFpga {
     pub writes: u32,
     /// The ADC has no clock.
     pub clockless: bool,
+    /// Level of the board's own LED enable.
+    pub pin: bool,
+    /// The FPGA's enable, or the board's, is high whatever its chip says.
+    pub stuck: (bool, bool),
+    /// Counts of a sample of the light of all LEDs, which the detector sees in runs of pattern 0 alone.
+    pub array_counts: u64,
+    /// The runs of pattern 0 alone: whether they are without light, and the level of the board's enable at their start.
+    pub of_pattern_0: Vec<(bool, bool)>,
+    /// The line of a ready frame stays low.
+    pub ready_line_broken: bool,
     /// Bits that the wires invert in the read after this many others.
     pub noise: Option<(u32, u32)>,
     config_error: bool,
@@ -99,6 +109,11 @@ impl Default for FakeFpga {
             accesses: 0,
             writes: 0,
             clockless: false,
+            pin: false,
+            stuck: (false, false),
+            array_counts: 5_000,
+            of_pattern_0: Vec::new(),
+            ready_line_broken: false,
             noise: None,
             config_error: false,
             after_loss: false,
@@ -125,7 +140,16 @@ impl FakeFpga {
     }
 
     pub fn leds_on(&self) -> bool {
-        self.running && self.interlock_closed && self.fault == FaultCode::None && !self.clockless
+        let unlit = self.get(Register::Mode) & mode::UNLIT != 0;
+        let may = self.interlock_closed && self.fault == FaultCode::None && !self.clockless;
+        self.running && may && !unlit
+    }
+
+    /// Whether LEDs shine in a slot of pattern 0: both enables are high, or look so.
+    fn shines(&self) -> bool {
+        let unlit = self.get(Register::Mode) & mode::UNLIT != 0;
+        let (fpga, board) = self.stuck;
+        (!unlit || fpga) && (self.pin || board)
     }
 
     /// Latches a fault, which ends the run.
@@ -146,6 +170,13 @@ impl FakeFpga {
         let patterns = self.get(Register::Patterns) as usize;
         if self.get(Register::Mode) & mode::TEST_SOURCE != 0 {
             return self.test_sums(patterns);
+        }
+        if patterns == 1 {
+            let word = |register| u64::from(self.get(register));
+            let samples = word(Register::Dwell) - word(Register::Blank);
+            let lit = if self.shines() { self.array_counts } else { 0 };
+            let sum = |counts: u64| (self.light + counts) * samples * word(Register::Sweeps);
+            return std::vec![Sums { positive: sum(lit), negative: sum(0) }];
         }
         (0..patterns as u64)
             .map(|k| {
@@ -317,7 +348,13 @@ impl FakeFpga {
             return;
         }
         self.running = true;
-        if self.instant {
+        let bits = self.get(Register::Mode);
+        if self.get(Register::Patterns) == 1 {
+            self.of_pattern_0.push((bits & mode::UNLIT != 0, self.pin));
+        }
+        // The packet of the training, which a test need not wait for.
+        let trains = mode::UNLIT | mode::PACKETS;
+        if self.instant || bits & trains == trains {
             for _ in 0..self.get(Register::Frames) {
                 self.make_frame();
             }
@@ -387,7 +424,7 @@ impl FpgaBus for FakeFpga {
     }
 
     fn frame_ready(&mut self) -> bool {
-        self.frame.is_some()
+        self.frame.is_some() && !self.ready_line_broken
     }
 
     fn raw_ready(&mut self) -> bool {

@@ -5,7 +5,7 @@ use crate::{Lamps, Micros, RESTARTS_SHOWN, flashes};
 use nirspi_wire::{Command, Fault, RunLength};
 use std::vec::Vec;
 
-const FAULTS: [Fault; 10] = [
+const FAULTS: [Fault; 12] = [
     Fault::Interlock,
     Fault::OverTemperature { centi_celsius: 7_000 },
     Fault::TemperatureSensor,
@@ -16,6 +16,8 @@ const FAULTS: [Fault; 10] = [
     Fault::FpgaStalled,
     Fault::FpgaWatchdog,
     Fault::HostSilent,
+    Fault::BoardEnableStuck,
+    Fault::FpgaEnableStuck,
 ];
 
 /// Flashes, the longest dark time of the fault lamp and its longest flash in milliseconds, over one minute.

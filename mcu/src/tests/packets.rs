@@ -265,7 +265,7 @@ fn a_self_test_and_a_burst_get_no_packets_and_the_run_after_them_does() {
     let mut bench = Bench::open();
     bench.ask(Command::Configure(SMALL)).unwrap();
     bench.fpga.instant = true;
-    let Ok(Answer::SelfTest(report)) = bench.ask(Command::SelfTest) else { panic!() };
+    let Ok(Answer::SelfTest(report)) = bench.ask_slowly(Command::SelfTest) else { panic!() };
     assert_eq!(report.failed, 0, "{report:?}");
     assert!(bench.fpga.sends_packets(), "as it was");
     bench.ask(Command::RawBurst { samples: 8 }).unwrap();

@@ -3,7 +3,10 @@
 
 use super::fake_fpga::FakeFpga;
 use super::support::*;
-use crate::{BoardInfo, Camera, Limits, Micros, NoLoader, PortBus, Ports, Progress};
+use crate::{
+    BoardInfo, Camera, Limits, Micros, NoLoader, PacketSink, PortBus, Ports, Progress, Target,
+    Wanted, training,
+};
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::packet::open;
 use nirspi_wire::register::{Register, mode};
@@ -32,6 +35,13 @@ impl Device {
         let bus = PortBus::new(Wired::new(), Box::leak(Box::new([0; MAX_FRAME_BYTES])));
         let camera = Camera::new(info, Limits::default());
         let mut device = Self { camera, bus, link: Link::default(), now: Micros(1_000) };
+        // The packet of the training comes by the host port.
+        for _ in 0..9 {
+            if device.camera.machine().port != training::Port::Sound {
+                device.turn();
+            }
+        }
+        device.bus.port().port.transfers.clear();
         device.ask(Command::Hello { protocol: version::CURRENT });
         device
     }
@@ -67,6 +77,16 @@ impl Device {
         let taken = self.camera.receive(now, bytes, &GOOD_INPUTS, ports);
         assert_eq!(taken, bytes.len());
         self.poll();
+        if let Some(Wanted { port, opcode, into: Target::Link(length) }) = self.bus.wanted()
+            && let Some(room) = self.link.claim(length)
+        {
+            let done = port.port.transfer(opcode, room);
+            self.bus.transferred(done);
+            let ports =
+                &mut Ports { bus: &mut self.bus, sink: &mut self.link, loader: &mut NoLoader };
+            self.camera.forward(now, ports);
+        }
+        self.fpga().pin = self.camera.may_light();
     }
 
     fn poll(&mut self) -> Progress {
@@ -495,14 +515,12 @@ fn a_self_test_and_a_burst_use_the_host_port_and_the_run_after_them_the_ring() {
     let serve = |device: &mut Device, command| {
         device.after(10, &packet(1, command));
         let mut heard = Vec::new();
-        for _ in 0..4 {
-            if let Some(crate::Wanted { port, opcode, into: crate::Target::Bus(bytes) }) =
-                device.bus.wanted()
-            {
+        for _ in 0..20 {
+            if let Some(Wanted { port, opcode, into: Target::Bus(bytes) }) = device.bus.wanted() {
                 let done = port.port.transfer(opcode, bytes);
                 device.bus.transferred(done);
             }
-            device.turn();
+            device.after(500, &[]);
             heard.extend(device.heard());
         }
         heard

@@ -2,6 +2,7 @@
 //! fake FPGA.
 
 use super::fake_fpga::FakeFpga;
+use crate::training::Port;
 use crate::{
     BoardInfo, Camera, GatewareLoader, Inputs, Limits, LoadError, Loan, Micros, PacketSink, Ports,
     Progress,
@@ -152,7 +153,7 @@ pub const SMALL: Configuration<'static> = Configuration {
 };
 
 impl Bench {
-    /// A bench after power-up and the first poll.
+    /// A bench after power-up and the first polls.
     pub fn new() -> Self {
         let info =
             BoardInfo::new("bench", "0001", Version(1, 2, 3)).can(Capabilities::LOAD_GATEWARE);
@@ -165,8 +166,19 @@ impl Bench {
             now: Micros(1_000),
             next_id: 1,
         };
-        bench.poll();
+        bench.train();
         bench
+    }
+
+    /// Polls until the packet port has been tried.
+    pub fn train(&mut self) {
+        for _ in 0..9 {
+            if self.camera.machine().port == Port::Sound {
+                return;
+            }
+            self.poll();
+        }
+        panic!("no training");
     }
 
     /// A bench with a session.
@@ -201,7 +213,9 @@ impl Bench {
     pub fn poll(&mut self) -> Progress {
         let mut ports =
             Ports { bus: &mut self.fpga, sink: &mut self.link, loader: &mut self.loader };
-        self.camera.poll(self.now, &self.inputs, &mut ports)
+        let progress = self.camera.poll(self.now, &self.inputs, &mut ports);
+        self.fpga.pin = self.camera.may_light();
+        progress
     }
 
     pub fn close_link(&mut self) {
@@ -233,8 +247,21 @@ impl Bench {
 
     /// Sends a command and polls until its reply comes. Messages before the reply stay on the link.
     pub fn ask(&mut self, command: Command<'_>) -> Result<Answer<'static>, Refusal> {
+        self.ask_in_steps(command, 0)
+    }
+
+    /// The same with half a millisecond between two polls.
+    pub fn ask_slowly(&mut self, command: Command<'_>) -> Result<Answer<'static>, Refusal> {
+        self.ask_in_steps(command, 500)
+    }
+
+    fn ask_in_steps(
+        &mut self,
+        command: Command<'_>,
+        step_us: u64,
+    ) -> Result<Answer<'static>, Refusal> {
         let id = self.send(command);
-        for _ in 0..10 {
+        for _ in 0..20 {
             let replies = self.link.packets.iter().map(|packet| message(packet));
             let place = replies.enumerate().find_map(|(place, message)| match message {
                 DeviceMessage::Reply(Reply { id: found, outcome }) if found == id => {
@@ -246,7 +273,7 @@ impl Bench {
                 self.link.packets.remove(place);
                 return outcome;
             }
-            self.poll();
+            self.after(step_us);
         }
         panic!("no reply to {command:?}");
     }

@@ -72,6 +72,14 @@ impl Display for Fault {
                 let seconds = HOST_SILENCE_US / 1_000_000;
                 write!(f, "the host sent no command for {seconds} s while LEDs were on")
             }
+            Self::BoardEnableStuck => f.write_str(
+                "LEDs shine while the board's LED enable is low: its pin, its wire or the array's AND gate is stuck; \
+                 switch the camera off and repair it",
+            ),
+            Self::FpgaEnableStuck => f.write_str(
+                "LEDs shine while the FPGA's LED enable is low: its pin, its wire or the array's AND gate is stuck; \
+                 switch the camera off and repair it",
+            ),
         }
     }
 }
@@ -152,6 +160,8 @@ mod tests {
             Fault::FpgaConfiguration,
             Fault::FpgaStalled,
             Fault::HostSilent,
+            Fault::BoardEnableStuck,
+            Fault::FpgaEnableStuck,
         ];
         for fault in faults {
             let told = fault.to_string();

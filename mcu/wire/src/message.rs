@@ -414,6 +414,10 @@ pub enum Fault {
     FpgaStalled,
     /// The host sent no command for [`HOST_SILENCE_US`] while LEDs were on.
     HostSilent,
+    /// The self-test saw light while the board's LED enable was low. Stands until the firmware restarts.
+    BoardEnableStuck,
+    /// The self-test saw light while the FPGA's LED enable was low. Stands until the firmware restarts.
+    FpgaEnableStuck,
 }
 
 /// What happened to a frame, one bit each; the same bits in the FPGA's header and on the wire.
@@ -603,7 +607,7 @@ impl SelfTestReport {
     pub const FPGA_BUS: u32 = 1 << 1;
     /// LEDs are off while not running.
     pub const LEDS_OFF: u32 = 1 << 2;
-    /// A frame of the test generator has exactly the sums that it must.
+    /// A frame of the test generator has exactly the sums that it must, and those that try the LED enables come whole.
     pub const TEST_FRAME: u32 = 1 << 3;
     /// Temperature is in a plausible range.
     pub const TEMPERATURE: u32 = 1 << 4;
@@ -615,9 +619,13 @@ impl SelfTestReport {
     pub const GATEWARE: u32 = 1 << 7;
     /// The ADC's clock ticks at its frequency. Without it, the checks that need it are left out.
     pub const ADC_CLOCK: u32 = 1 << 8;
+    /// The detector sees no light while the board's LED enable is low. Left out where there is too little light to judge by.
+    pub const BOARD_ENABLE: u32 = 1 << 9;
+    /// The detector sees no light while the FPGA's LED enable is low. Left out like `BOARD_ENABLE`.
+    pub const FPGA_ENABLE: u32 = 1 << 10;
 
     /// Name of every check, by bit.
-    pub const NAMES: [(u32, &'static str); 9] = [
+    pub const NAMES: [(u32, &'static str); 11] = [
         (Self::FPGA_IDENTITY, "FPGA identity"),
         (Self::FPGA_BUS, "FPGA bus"),
         (Self::LEDS_OFF, "LEDs off at rest"),
@@ -627,5 +635,7 @@ impl SelfTestReport {
         (Self::MEMORY, "frame memory"),
         (Self::GATEWARE, "gateware"),
         (Self::ADC_CLOCK, "ADC clock"),
+        (Self::BOARD_ENABLE, "board's LED enable"),
+        (Self::FPGA_ENABLE, "FPGA's LED enable"),
     ];
 }

@@ -10,6 +10,7 @@
 //! | [`Request::number`] | 1 | bits of [`Lines`] | 1 |
 //! | address | 2 | temperature, hundredths of a degree Celsius | 2 |
 //! | argument: value to write, or bytes to read | 4 | value or bytes that were read | [`Request::reply_data`] |
+//! | level of the board's LED enable, 0 or 1 | 1 | | |
 //! | CRC-32 of all before | 4 | CRC-32 of all before | 4 |
 //!
 //! # Invariant
@@ -23,7 +24,7 @@ use crate::host_port::{READ_FRAME, READ_PACKET, READ_RAW, READ_REGISTER, WRITE_R
 /// Opcode without an access: time passes, and the reply has the state of the lines.
 pub const LOOK: u8 = 0x00;
 /// Number of bytes of a request.
-pub const REQUEST_BYTES: usize = 12;
+pub const REQUEST_BYTES: usize = 13;
 /// Number of bytes of a reply before its data.
 pub const REPLY_HEAD_BYTES: usize = 4;
 /// Number of bytes of the checksum.
@@ -41,6 +42,8 @@ pub struct Request {
     pub address: u16,
     /// Value to write, or bytes of a frame or burst to read.
     pub argument: u32,
+    /// Level of the board's own LED enable.
+    pub board_enable: bool,
 }
 
 impl Request {
@@ -49,9 +52,10 @@ impl Request {
     pub fn to_bytes(self) -> [u8; REQUEST_BYTES] {
         let [a0, a1] = self.address.to_le_bytes();
         let [v0, v1, v2, v3] = self.argument.to_le_bytes();
-        let head = [self.opcode, self.number, a0, a1, v0, v1, v2, v3];
+        let pin = u8::from(self.board_enable);
+        let head = [self.opcode, self.number, a0, a1, v0, v1, v2, v3, pin];
         let [c0, c1, c2, c3] = crc32(&head).to_le_bytes();
-        [self.opcode, self.number, a0, a1, v0, v1, v2, v3, c0, c1, c2, c3]
+        [self.opcode, self.number, a0, a1, v0, v1, v2, v3, pin, c0, c1, c2, c3]
     }
 
     /// The request; `None` if the bytes are not a request, or ask for more than the longest frame.
@@ -65,12 +69,12 @@ impl Request {
         if !known || crc32(head) != u32::from_le_bytes(*crc) {
             return None;
         }
-        let &[opcode, number, a0, a1, v0, v1, v2, v3, ..] = bytes;
+        let &[opcode, number, a0, a1, v0, v1, v2, v3, pin, ..] = bytes;
         let (address, argument) =
             (u16::from_le_bytes([a0, a1]), u32::from_le_bytes([v0, v1, v2, v3]));
         // No frame or burst is longer, and the reply has as many bytes as were asked for.
-        let request = Self { opcode, number, address, argument };
-        (request.reply_data() <= MAX_FRAME_BYTES).then_some(request)
+        let request = Self { opcode, number, address, argument, board_enable: pin == 1 };
+        (pin <= 1 && request.reply_data() <= MAX_FRAME_BYTES).then_some(request)
     }
 
     /// Number of data bytes in the reply.
@@ -138,11 +142,11 @@ mod tests {
     proptest! {
         #[test]
         fn a_request_comes_back_and_no_damaged_one_does(
-            number: u8, address: u16, argument: u32,
+            number: u8, address: u16, argument: u32, board_enable: bool,
             opcode in prop::sample::select(&[LOOK, WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_PACKET, READ_RAW][..]),
             at in 0..REQUEST_BYTES, flip in 1u8..,
         ) {
-            let request = Request { opcode, number, address, argument };
+            let request = Request { opcode, number, address, argument, board_enable };
             let mut bytes = request.to_bytes();
             let fits = request.reply_data() <= MAX_FRAME_BYTES;
             prop_assert_eq!(Request::from_bytes(&bytes), fits.then_some(request));
@@ -164,7 +168,13 @@ mod tests {
     #[test]
     fn a_request_for_more_than_a_frame_is_refused() {
         let ask = |argument| {
-            let request = Request { opcode: READ_FRAME, number: 1, address: 0, argument };
+            let request = Request {
+                opcode: READ_FRAME,
+                number: 1,
+                address: 0,
+                argument,
+                board_enable: false,
+            };
             Request::from_bytes(&request.to_bytes())
         };
         assert!(ask(MAX_FRAME_BYTES as u32).is_some());
@@ -174,7 +184,10 @@ mod tests {
 
     #[test]
     fn a_reply_has_a_registers_bytes_or_as_many_as_were_asked_for() {
-        let reply = |opcode| Request { opcode, number: 1, address: 2, argument: 30 }.reply_data();
+        let reply = |opcode| {
+            let (number, address, argument) = (1, 2, 30);
+            Request { opcode, number, address, argument, board_enable: true }.reply_data()
+        };
         let opcodes = [LOOK, WRITE_REGISTER, READ_REGISTER, READ_FRAME, READ_PACKET, READ_RAW];
         assert_eq!(opcodes.map(reply), [0, 0, 4, 30, 30, 30]);
     }

@@ -122,6 +122,8 @@ fn bits_codes_and_limits_are_these() {
         "64 frame memory",
         "128 gateware",
         "256 ADC clock",
+        "512 board's LED enable",
+        "1024 FPGA's LED enable",
     ];
     assert_eq!(checks, expected);
     assert_eq!(register::ORDER_TABLE, 0x0400);

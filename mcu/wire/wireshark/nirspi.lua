@@ -24,7 +24,7 @@ local Refusal = { "Protocol", "State", "Configuration", "Fault", "NoSuchRegister
 local ConfigProblem = { "OutOfRange", "OrderEntry" }
 local ConfigField = { "Patterns", "ClocksPerPattern", "Blanked", "AdcLatency", "Sweeps", "OrderLength", "DutyPermille", "Frames" }
 local State = { "Idle", "Configured", "Running", "Fault" }
-local Fault = { "Interlock", "OverTemperature", "TemperatureSensor", "Duty", "OverRange", "FpgaWatchdog", "FpgaAbsent", "FpgaConfiguration", "FpgaStalled", "HostSilent" }
+local Fault = { "Interlock", "OverTemperature", "TemperatureSensor", "Duty", "OverRange", "FpgaWatchdog", "FpgaAbsent", "FpgaConfiguration", "FpgaStalled", "HostSilent", "BoardEnableStuck", "FpgaEnableStuck" }
 local EventKind = { "Fault", "RunEnded", "RawDropped", "CommandDamaged", "FpgaAccessesDamaged" }
 
 local fields = {

@@ -38,11 +38,11 @@ impl Front {
         Self::Loopback(VecDeque::from([Lines::default(); 7]))
     }
 
-    /// The sample in a clock with these lines.
-    fn sample(&mut self, lines: Lines) -> AdcSample {
+    /// The sample in a clock with these lines, and this level of the board's LED enable.
+    fn sample(&mut self, lines: Lines, board_enable: bool) -> AdcSample {
         match self {
             Self::Camera(array, chain) => {
-                let light = array.step(lines.rows, lines.columns, lines.enable);
+                let light = array.step(lines.rows, lines.columns, lines.enable && board_enable);
                 let sample = chain.sample(light);
                 AdcSample { code: sample.counts, over_range: sample.over_range }
             }
@@ -60,6 +60,8 @@ pub struct Board {
     pins: Pins,
     front: Front,
     at_pins: AdcSample,
+    /// Level of the microcontroller's LED enable.
+    board_enable: bool,
     /// What the wires of the parallel port lead to, if there are any.
     receiver: Option<Receiver>,
     is_ready: bool,
@@ -96,6 +98,7 @@ impl Board {
             pins,
             front,
             at_pins: AdcSample::default(),
+            board_enable: false,
             receiver: None,
             is_ready: false,
             clock: 0,
@@ -132,11 +135,15 @@ impl Board {
         self.pins.interlock(closed);
     }
 
+    pub fn board_enable(&mut self, high: bool) {
+        self.board_enable = high;
+    }
+
     /// One clock of the ADC. The sample has the light of this clock's lines, except for the latency
     /// of the optical chain.
     fn adc_clock(&mut self) {
         let lines = self.pins.leds();
-        let sample = self.front.sample(lines);
+        let sample = self.front.sample(lines, self.board_enable);
         if self.at_pins != sample {
             self.at_pins = sample;
             self.pins.sample(sample);

@@ -7,12 +7,13 @@ use crate::board::{Board, Front, HOST_PS, Seen};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::Chain;
 use nirspi_virtual::{SimulatedFpga, VirtualOptics};
-use nirspi_wire::register::{Register, control};
+use nirspi_wire::register::{Register, control, mode};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 enum Ask {
     Advance(u32),
     Interlock(bool),
+    BoardEnable(bool),
     AdcClock(bool),
     Read(u16),
     Write(u16, u32),
@@ -34,6 +35,12 @@ pub struct RtlFpga {
     seen: Seen,
     frame: Option<Vec<u8>>,
     raw: Option<Vec<u8>>,
+    /// Level of the microcontroller's LED enable.
+    board_enable: bool,
+    /// The mode written last.
+    mode: u32,
+    /// A run without light was started and neither stopped nor released: no pin shows it for certain.
+    unlit: bool,
 }
 
 impl RtlFpga {
@@ -64,6 +71,7 @@ impl RtlFpga {
                 match ask {
                     Ask::Advance(clocks) => board.advance(clocks),
                     Ask::Interlock(closed) => board.interlock(closed),
+                    Ask::BoardEnable(high) => board.board_enable(high),
                     Ask::AdcClock(ticks) => board.set_adc_clock(ticks),
                     Ask::Read(address) => told.value = board.read(address),
                     Ask::Write(address, value) => board.write(address, value),
@@ -76,7 +84,16 @@ impl RtlFpga {
                 }
             }
         });
-        Self { asks, answers, seen: Seen::default(), frame: None, raw: None }
+        Self {
+            asks,
+            answers,
+            seen: Seen::default(),
+            frame: None,
+            raw: None,
+            board_enable: false,
+            mode: 0,
+            unlit: false,
+        }
     }
 
     fn ask(&mut self, ask: Ask) -> Told {
@@ -94,8 +111,15 @@ impl FpgaBus for RtlFpga {
 
     fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
         const STARTS: u32 = control::START | control::START_RAW;
-        if address == Register::Control.address() && value & (control::RELEASE | STARTS) != 0 {
-            (self.frame, self.raw) = (None, None);
+        if address == Register::Control.address() {
+            if value & (control::RELEASE | STARTS) != 0 {
+                (self.frame, self.raw) = (None, None);
+            }
+            if value & (control::STOP | control::RELEASE | STARTS) != 0 {
+                self.unlit = value & STARTS != 0 && self.mode & mode::UNLIT != 0;
+            }
+        } else if address == Register::Mode.address() {
+            self.mode = value;
         }
         self.ask(Ask::Write(address, value));
         Ok(())
@@ -134,10 +158,18 @@ impl SimulatedFpga for RtlFpga {
     }
 
     fn running(&self) -> bool {
-        self.seen.lit
+        self.seen.lit || self.unlit
     }
 
     fn set_interlock(&mut self, closed: bool) {
         self.ask(Ask::Interlock(closed));
+    }
+
+    fn set_board_enable(&mut self, high: bool) {
+        // Most turns of the firmware leave the level as it is.
+        if self.board_enable != high {
+            self.board_enable = high;
+            self.ask(Ask::BoardEnable(high));
+        }
     }
 }

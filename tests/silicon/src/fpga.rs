@@ -22,6 +22,8 @@ pub trait Fpga {
     fn ready(&mut self) -> (bool, bool);
     /// Whether its lines may change by themselves.
     fn runs(&self) -> bool;
+    /// The level of the board's LED enable, beside its own.
+    fn set_board_enable(&mut self, high: bool);
     /// The next bytes of the parallel port, at most so many.
     fn parallel(&mut self, most: usize) -> Vec<u8>;
 }
@@ -91,6 +93,10 @@ impl<F: SimulatedFpga> Fpga for Golden<F> {
         self.model.running() || !self.sending.is_empty()
     }
 
+    fn set_board_enable(&mut self, high: bool) {
+        self.model.set_board_enable(high);
+    }
+
     fn parallel(&mut self, most: usize) -> Vec<u8> {
         while self.sending.len() < most
             && let Some(packet) = (self.packet)(&mut self.model)
@@ -135,6 +141,9 @@ impl SimulatedFpga for Even {
     fn set_interlock(&mut self, closed: bool) {
         self.gateware.set_interlock(closed);
     }
+
+    /// Without light there is nothing to switch.
+    fn set_board_enable(&mut self, _high: bool) {}
 }
 
 impl FpgaBus for Even {

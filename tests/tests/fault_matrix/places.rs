@@ -122,6 +122,10 @@ impl SimulatedFpga for Scripted {
     fn set_interlock(&mut self, closed: bool) {
         self.inner.set_interlock(closed);
     }
+
+    fn set_board_enable(&mut self, high: bool) {
+        self.inner.set_board_enable(high);
+    }
 }
 
 impl FpgaBus for Scripted {

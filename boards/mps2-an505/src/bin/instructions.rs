@@ -32,7 +32,7 @@ use nirspi_mcu::{
 use nirspi_wire::fpga::MAX_FRAME_BYTES;
 use nirspi_wire::host_port::{SEALED_BYTES, seal, unseal};
 use nirspi_wire::packet::{self, MAX_HOST_PACKET, encode};
-use nirspi_wire::register::{IDENTITY, Register, clocks, control, status};
+use nirspi_wire::register::{IDENTITY, Register, clocks, control, mode, status};
 use nirspi_wire::samples::Width;
 use nirspi_wire::{
     ADC_HZ, Command, Configuration, FrameFlags, PATTERNS, PatternOrder, Request, RunLength,
@@ -106,7 +106,9 @@ impl HostPort for Memory {
                 self.sequence += 1;
             }
         } else if let Some(slot) = self.slot(address) {
-            *slot = value;
+            // This FPGA has no runs without light, so nothing is compared at the start.
+            let is_mode = address == Register::Mode.address();
+            *slot = if is_mode { value & !mode::UNLIT } else { value };
         }
         Ok(())
     }

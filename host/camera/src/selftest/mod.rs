@@ -24,7 +24,7 @@ use crate::response::Settling;
 use crate::session::{IgnorePackets, Session, SessionError};
 use nirspi_files::causes;
 use nirspi_wire::register::{IDENTITY, clocks};
-use nirspi_wire::{ADC_HZ, ADC_MAX, CLOCKS_PER_PATTERN, SelfTestReport, Version};
+use nirspi_wire::{ADC_HZ, ADC_MAX, CLOCKS_PER_PATTERN, Fault, SelfTestReport, Version};
 use std::time::Duration;
 
 /// Least step of all LEDs together, as a share of the ADC's range. With a smaller step, a single
@@ -184,6 +184,10 @@ fn min_step_counts() -> f64 {
 /// does not know has its number as name. What the FPGA's registers say stands beside the checks of the FPGA.
 fn device(report: SelfTestReport, fpga: &Fpga) -> Vec<Check> {
     let told = |words: Result<String, FpgaProblem>| words.unwrap_or_else(|p| p.to_string());
+    let failed = |check: u32| report.failed & check != 0;
+    let alone = |check: u32, stuck: Fault| {
+        if failed(check) { stuck.to_string() } else { "dark while it alone is low".to_owned() }
+    };
     let note = |bit: u32| match 1 << bit {
         SelfTestReport::FPGA_IDENTITY => {
             told(fpga.check_identity().map(|()| format!("{IDENTITY:#010x} as expected")))
@@ -196,6 +200,10 @@ fn device(report: SelfTestReport, fpga: &Fpga) -> Vec<Check> {
             let (expected, off) = (ADC_HZ / 1_000_000, clocks::TOLERANCE_PERCENT);
             format!("{mhz:.2} MHz by the FPGA's oscillator, expected {expected} MHz within {off} %")
         })),
+        SelfTestReport::BOARD_ENABLE => {
+            alone(SelfTestReport::BOARD_ENABLE, Fault::BoardEnableStuck)
+        }
+        SelfTestReport::FPGA_ENABLE => alone(SelfTestReport::FPGA_ENABLE, Fault::FpgaEnableStuck),
         _ => String::new(),
     };
     let named = |bit: u32| SelfTestReport::NAMES.iter().find(|(mask, _)| *mask == 1 << bit);

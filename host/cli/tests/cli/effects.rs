@@ -128,7 +128,13 @@ fn an_emulated_board_finds_the_fpga_behind_its_tunnel() {
     fpga.says("FPGA behind ");
     let (mut board, _) = listener.accept().unwrap();
     let identity = Register::Identity.address();
-    let request = Request { opcode: READ_REGISTER, number: 7, address: identity, argument: 0 };
+    let request = Request {
+        opcode: READ_REGISTER,
+        number: 7,
+        address: identity,
+        argument: 0,
+        board_enable: false,
+    };
     board.write_all(&request.to_bytes()).unwrap();
     let mut reply = [0; REPLY_HEAD_BYTES + 4 + CRC_BYTES];
     board.read_exact(&mut reply).unwrap();

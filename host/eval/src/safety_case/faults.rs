@@ -214,10 +214,14 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the FPGA's LED enable is stuck high",
-        Lit::Brightest,
-        "the LED lines are low outside a run; the run ends as always, at the latest when the host falls silent",
-        HOST_SILENCE,
-        &["a_silent_host", "no_light_with_a_fault_latched_an_open_interlock_or_no_run"],
+        Lit::All,
+        "lines at rest light every LED while the firmware's enable is high, from a configuration to the end of the session \
+         or a fault (and the array's one-shot ends that after 10 ms); `nirspi selftest` finds it, and forbids light",
+        DarkAfter::Never,
+        &[
+            "a_stuck_enable_is_a_fault_that_no_configuration_acknowledges",
+            "a_stuck_led_enable_is_named_and_forbids_light",
+        ],
     ),
     fault(
         "wrong or foreign gateware",
@@ -256,9 +260,14 @@ pub const FAULTS: &[SingleFault] = &[
     fault(
         "the microcontroller's LED enable is stuck high",
         Lit::Brightest,
-        "the FPGA's enable falls with every end of a run, at the latest when the host falls silent",
+        "the FPGA's enable falls with every end of a run, at the latest when the host falls silent; `nirspi selftest` finds \
+         it, and forbids light",
         HOST_SILENCE,
-        &["a_silent_host", "each_fault_that_the_fpga_latches"],
+        &[
+            "a_silent_host",
+            "each_fault_that_the_fpga_latches",
+            "a_stuck_led_enable_is_named_and_forbids_light",
+        ],
     ),
     fault(
         "the bus between microcontroller and FPGA is cut",
@@ -324,10 +333,11 @@ pub const FAULTS: &[SingleFault] = &[
     ),
     fault(
         "the array's AND gate is stuck high",
-        Lit::Brightest,
-        "the LED lines are low outside a run; the run ends as always (and the interlock cuts the supply)",
-        HOST_SILENCE,
-        &["a_silent_host"],
+        Lit::All,
+        "nothing but the interlock, which cuts the supply: lines at rest light every LED. `nirspi selftest` finds it while \
+         the supply is on",
+        DarkAfter::Never,
+        &["both_enables_are_high_only_after_each_has_kept_the_array_dark"],
     ),
     fault(
         "one LED's transistor is shorted",

@@ -3,6 +3,7 @@
 use crate::machine::{Activity, Session};
 use crate::notices::Notice;
 use crate::tests::support::{Bench, GOOD_INPUTS, SMALL, packet};
+use crate::training::Port;
 use crate::{Camera, Crash, Limits, Micros};
 use nirspi_wire::packet::{encode, open};
 use nirspi_wire::register::{FaultCode, Register};
@@ -136,7 +137,9 @@ impl World {
         bench.camera = Camera::new(bench.camera.machine().info.clone(), limits);
         let mut world =
             Self { bench, troubles: 0, seen: Seen::default(), last_command: Micros(0), starved: 0 };
-        world.poll().expect("a camera after power-up");
+        for _ in 0..2 {
+            world.poll().expect("a camera after power-up");
+        }
         world
     }
 
@@ -508,12 +511,22 @@ impl World {
             }
             Activity::Burst(burst) => (2, burst.key(age), fpga.raw.is_some()).hash(hash),
             Activity::TestFrame(test) => (3, test.key(age)).hash(hash),
+            Activity::Enables(enables) => (4, enables.key(age)).hash(hash),
+            Activity::Training(training) => (5, training.key(age)).hash(hash),
         }
         let busy = !matches!(machine.activity, Activity::Resting);
         let due = machine.last_check.is_none_or(|last| last != *now);
         (machine.setup.is_some(), machine.reboot.is_some(), machine.crash.is_some(), due)
             .hash(hash);
         (machine.off_pending, machine.release_pending).hash(hash);
+        match machine.port {
+            Port::Unknown(due) => (1, due > *now).hash(hash),
+            Port::Sound => 2.hash(hash),
+        }
+        // The run without light of a self-test may come from an earlier poll.
+        if let Activity::Enables(_) = machine.activity {
+            fpga.pin.hash(hash);
+        }
         (busy.then(|| age(machine.last_command)), busy.then(|| age(self.last_command))).hash(hash);
         machine.loading.as_ref().map(crate::gateware::Loading::key).hash(hash);
         if let Some(fault) = machine.fault {

@@ -379,6 +379,20 @@ pub fn device_messages() -> Vec<(DeviceMessage<'static>, &'static str)> {
         ),
         (
             DeviceMessage::Reply(Reply {
+                id: 11,
+                outcome: Err(Refusal::Fault(Fault::BoardEnableStuck)),
+            }),
+            "00 0b 01 03 0a",
+        ),
+        (
+            DeviceMessage::Reply(Reply {
+                id: 11,
+                outcome: Err(Refusal::Fault(Fault::FpgaEnableStuck)),
+            }),
+            "00 0b 01 03 0b",
+        ),
+        (
+            DeviceMessage::Reply(Reply {
                 id: 12,
                 outcome: Err(Refusal::NoSuchRegister { address: 0x0FFF }),
             }),

@@ -46,7 +46,7 @@ variants! {
     state: State { Idle, Configured, Running, Fault }
     fault: Fault {
         Interlock, OverTemperature, TemperatureSensor, Duty, OverRange, FpgaWatchdog, FpgaAbsent,
-        FpgaConfiguration, FpgaStalled, HostSilent,
+        FpgaConfiguration, FpgaStalled, HostSilent, BoardEnableStuck, FpgaEnableStuck,
     }
     event_kind: EventKind { Fault, RunEnded, RawDropped, CommandDamaged, FpgaAccessesDamaged }
 }

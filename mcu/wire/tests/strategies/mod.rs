@@ -114,6 +114,8 @@ fn fault() -> impl Strategy<Value = Fault> {
             Fault::FpgaConfiguration,
             Fault::FpgaStalled,
             Fault::HostSilent,
+            Fault::BoardEnableStuck,
+            Fault::FpgaEnableStuck,
         ]),
     ]
 }

@@ -435,7 +435,8 @@ fn answered(line: &[u8]) {
 
 fn tunnel_seeds() -> Vec<Vec<u8>> {
     let ask = |opcode, number, address, argument| {
-        tunnel::Request { opcode, number, address, argument }.to_bytes().to_vec()
+        let board_enable = number % 2 == 0;
+        tunnel::Request { opcode, number, address, argument, board_enable }.to_bytes().to_vec()
     };
     let identity = ask(READ_REGISTER, 1, Register::Identity.address(), 0);
     let run = [

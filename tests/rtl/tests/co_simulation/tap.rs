@@ -85,4 +85,8 @@ impl<F: SimulatedFpga> SimulatedFpga for Tap<F> {
     fn set_interlock(&mut self, closed: bool) {
         self.fpga.set_interlock(closed);
     }
+
+    fn set_board_enable(&mut self, high: bool) {
+        self.fpga.set_board_enable(high);
+    }
 }

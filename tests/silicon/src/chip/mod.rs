@@ -182,6 +182,7 @@ impl Chip {
         };
         chip.start_clocks();
         chip.drive_named("interlock", true);
+        chip.fpga.set_board_enable(false);
         chip
     }
 
@@ -550,6 +551,8 @@ impl Chip {
 
     fn light_changed(&mut self, lit: bool) {
         self.light_log.push((self.now, lit));
+        self.fpga.advance(self.now);
+        self.fpga.set_board_enable(lit);
         self.check_light();
     }
 
