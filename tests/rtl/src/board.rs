@@ -6,6 +6,7 @@ use crate::receiver::Receiver;
 use nirspi_hdl_model::{AdcSample, Lines};
 use nirspi_hdl_sim::{pins::Pins, project::Project};
 use nirspi_optics::{Chain, LedArray};
+use nirspi_virtual::StuckEnable;
 use nirspi_wire::fpga::{FpgaFrame, HEADER_BYTES, frame_bytes};
 use nirspi_wire::host_port::{
     DUMMY_CYCLES, QUAD, READ_FRAME, READ_PACKET, READ_RAW, READ_REGISTER, SCK_DIVIDER,
@@ -38,11 +39,11 @@ impl Front {
         Self::Loopback(VecDeque::from([Lines::default(); 7]))
     }
 
-    /// The sample in a clock with these lines, and this level of the board's LED enable.
-    fn sample(&mut self, lines: Lines, board_enable: bool) -> AdcSample {
+    /// The sample in a clock with these lines, of which the LEDs have this enable.
+    fn sample(&mut self, lines: Lines, shines: bool) -> AdcSample {
         match self {
             Self::Camera(array, chain) => {
-                let light = array.step(lines.rows, lines.columns, lines.enable && board_enable);
+                let light = array.step(lines.rows, lines.columns, shines);
                 let sample = chain.sample(light);
                 AdcSample { code: sample.counts, over_range: sample.over_range }
             }
@@ -62,6 +63,8 @@ pub struct Board {
     at_pins: AdcSample,
     /// Level of the microcontroller's LED enable.
     board_enable: bool,
+    /// One of the two enables is high whatever its chip says.
+    pub stuck: Option<StuckEnable>,
     /// What the wires of the parallel port lead to, if there are any.
     receiver: Option<Receiver>,
     is_ready: bool,
@@ -99,6 +102,7 @@ impl Board {
             front,
             at_pins: AdcSample::default(),
             board_enable: false,
+            stuck: None,
             receiver: None,
             is_ready: false,
             clock: 0,
@@ -143,7 +147,9 @@ impl Board {
     /// of the optical chain.
     fn adc_clock(&mut self) {
         let lines = self.pins.leds();
-        let sample = self.front.sample(lines, self.board_enable);
+        let fpga = lines.enable || self.stuck == Some(StuckEnable::Fpga);
+        let board = self.board_enable || self.stuck == Some(StuckEnable::Board);
+        let sample = self.front.sample(lines, fpga && board);
         if self.at_pins != sample {
             self.at_pins = sample;
             self.pins.sample(sample);

@@ -6,7 +6,7 @@
 use crate::board::{Board, Front, HOST_PS, Seen};
 use nirspi_mcu::{BusError, FpgaBus};
 use nirspi_optics::Chain;
-use nirspi_virtual::{SimulatedFpga, VirtualOptics};
+use nirspi_virtual::{SimulatedFpga, StuckEnable, VirtualOptics};
 use nirspi_wire::register::{Register, control, mode};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
@@ -46,14 +46,19 @@ pub struct RtlFpga {
 impl RtlFpga {
     /// A board in front of a scene, powered, with the interlock closed.
     pub fn new(optics: &VirtualOptics, seed: u64) -> Self {
+        Self::with(optics, seed, None)
+    }
+
+    /// The same with an LED enable that is stuck high.
+    pub fn with(optics: &VirtualOptics, seed: u64, stuck: Option<StuckEnable>) -> Self {
         let array = optics.led_array();
         let chain = Chain::new(*optics.chain(), seed).unwrap();
-        Self::behind(Front::Camera(Box::new(array), Box::new(chain)))
+        Self::behind(Front::Camera(Box::new(array), Box::new(chain)), stuck)
     }
 
     /// Two evaluation boards and the wires between them, with the bring-up design and the interlock closed.
     pub fn bring_up() -> Self {
-        Self::behind(Front::loopback())
+        Self::behind(Front::loopback(), None)
     }
 
     /// Takes the ADC's clock away, or brings it back.
@@ -61,11 +66,12 @@ impl RtlFpga {
         self.ask(Ask::AdcClock(ticks));
     }
 
-    fn behind(front: Front) -> Self {
+    fn behind(front: Front, stuck: Option<StuckEnable>) -> Self {
         let (asks, asked) = channel();
         let (answer, answers) = channel();
         std::thread::spawn(move || {
             let mut board = Board::new(front, HOST_PS);
+            board.stuck = stuck;
             for ask in asked {
                 let mut told = Told::default();
                 match ask {

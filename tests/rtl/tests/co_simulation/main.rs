@@ -19,10 +19,10 @@ use nirspi_optics::Scene;
 use nirspi_recon::{Measurements, Order, Rows, Side, fwht, metrics, reconstruct};
 use nirspi_tests::tapped;
 use nirspi_tests_rtl::RtlFpga;
-use nirspi_virtual::{MemoryLink, SimulatedFpga, VirtualCamera, VirtualOptics};
+use nirspi_virtual::{MemoryLink, SimulatedFpga, StuckEnable, VirtualCamera, VirtualOptics};
 use nirspi_wire::ready;
 use nirspi_wire::samples::Width;
-use nirspi_wire::{DeviceMessage, Fault, Frame, FrameFlags, open};
+use nirspi_wire::{DeviceMessage, Fault, Frame, FrameFlags, SelfTestReport, open};
 use std::ops::ControlFlow;
 use std::time::Duration;
 use tap::{Log, Tap};
@@ -228,6 +228,24 @@ fn frames_that_a_slow_bus_loses_are_counted_and_spoil_no_other() {
         let Told { sequence, flags, .. } = Told::of(&bytes, setup.rows.len());
         assert_eq!(flags.contains(FrameFlags::AFTER_LOSS), sequence != expected);
         expected = sequence + 1;
+    }
+}
+
+/// Runs with and without light, at the pins of the RTL.
+#[test]
+fn the_self_test_tries_each_led_enable_through_the_rtl() {
+    let both = SelfTestReport::BOARD_ENABLE | SelfTestReport::FPGA_ENABLE;
+    for (stuck, ran, failed) in [
+        (None, both, 0),
+        (Some(StuckEnable::Fpga), both, SelfTestReport::FPGA_ENABLE),
+        (Some(StuckEnable::Board), SelfTestReport::BOARD_ENABLE, SelfTestReport::BOARD_ENABLE),
+    ] {
+        let mut fpga = RtlFpga::with(&ideal(), 1, stuck);
+        // The frequency of the ADC's clock is known after 0.4 ms.
+        fpga.advance(60_000);
+        let mut session = session(&ideal(), fpga);
+        let report = session.self_test(&mut IgnorePackets).unwrap();
+        assert_eq!((report.ran & both, report.failed), (ran, failed), "{stuck:?}");
     }
 }
 
