@@ -215,13 +215,11 @@ pub const FAULTS: &[SingleFault] = &[
     fault(
         "the FPGA's LED enable is stuck high",
         Lit::All,
-        "lines at rest light every LED while the firmware's enable is high, from a configuration to the end of the session \
-         or a fault (and the array's one-shot ends that after 10 ms); `nirspi selftest` finds it, and forbids light",
+        "nothing within a session: lines at rest light every LED from a configuration on, until the session ends or a fault \
+         comes, with which the firmware's enable falls (and the array's one-shot ends it after 10 ms). `nirspi selftest` \
+         finds it, and forbids light",
         DarkAfter::Never,
-        &[
-            "a_stuck_enable_is_a_fault_that_no_configuration_acknowledges",
-            "a_stuck_led_enable_is_named_and_forbids_light",
-        ],
+        &[],
     ),
     fault(
         "wrong or foreign gateware",
@@ -266,7 +264,7 @@ pub const FAULTS: &[SingleFault] = &[
         &[
             "a_silent_host",
             "each_fault_that_the_fpga_latches",
-            "a_stuck_led_enable_is_named_and_forbids_light",
+            "a_stuck_enable_is_a_fault_that_no_configuration_acknowledges",
         ],
     ),
     fault(
@@ -337,7 +335,7 @@ pub const FAULTS: &[SingleFault] = &[
         "nothing but the interlock, which cuts the supply: lines at rest light every LED. `nirspi selftest` finds it while \
          the supply is on",
         DarkAfter::Never,
-        &["both_enables_are_high_only_after_each_has_kept_the_array_dark"],
+        &[],
     ),
     fault(
         "one LED's transistor is shorted",
