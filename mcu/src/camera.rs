@@ -97,8 +97,9 @@ impl Camera {
         now: Micros,
         ports: &mut Ports<'_, B, S, G>,
     ) {
-        self.machine.step_run(now, ports.bus, ports.sink);
-        self.machine.step_training(now, ports.bus, ports.sink);
+        if !self.machine.step_run(now, ports.bus, ports.sink) {
+            self.machine.step_training(now, ports.bus, ports.sink);
+        }
     }
 
     /// Forwards a time-of-flight map of `side` x `side` distances in mm, measured now. The map is

@@ -367,6 +367,8 @@ impl Machine {
     }
 
     /// Goes on with the test of the LED enables.
+    #[cold]
+    #[inline(never)]
     pub fn step_enables(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
         let Activity::Enables(enables) = &mut self.activity else { return false };
         let Some(verdict) = enables.step(now, bus, &self.limits) else { return false };
@@ -385,6 +387,10 @@ impl Machine {
     }
 
     /// Begins a training if one is due and nothing forbids a start; true if it has begun.
+    ///
+    /// Never inlined, like the other steps that no run takes, so that those of a run are short.
+    #[cold]
+    #[inline(never)]
     pub fn start_training(&mut self, now: Micros, bus: &mut impl FpgaBus) -> bool {
         let Port::Unknown(due) = self.port else { return false };
         let may_start = matches!(self.activity, Activity::Resting)
@@ -412,6 +418,8 @@ impl Machine {
     }
 
     /// Compares the packet of the training if it has come.
+    #[cold]
+    #[inline(never)]
     pub fn step_training(
         &mut self,
         now: Micros,
