@@ -216,7 +216,7 @@ pub const FAULTS: &[SingleFault] = &[
         "the FPGA's LED enable is stuck high",
         Lit::All,
         "nothing within a session: lines at rest light every LED from a configuration on, until the session ends or a fault \
-         comes, with which the firmware's enable falls (and the array's one-shot ends it after 10 ms). `nirspi selftest` \
+         comes, with which the firmware's enable falls (and the array's one-shot ends it after 10 ms). `nirspi camera selftest` \
          finds it, and forbids light",
         DarkAfter::Never,
         &[],
@@ -258,7 +258,7 @@ pub const FAULTS: &[SingleFault] = &[
     fault(
         "the microcontroller's LED enable is stuck high",
         Lit::Brightest,
-        "the FPGA's enable falls with every end of a run, at the latest when the host falls silent; `nirspi selftest` finds \
+        "the FPGA's enable falls with every end of a run, at the latest when the host falls silent; `nirspi camera selftest` finds \
          it, and forbids light",
         HOST_SILENCE,
         &[
@@ -332,7 +332,7 @@ pub const FAULTS: &[SingleFault] = &[
     fault(
         "the array's AND gate is stuck high",
         Lit::All,
-        "nothing but the interlock, which cuts the supply: lines at rest light every LED. `nirspi selftest` finds it while \
+        "nothing but the interlock, which cuts the supply: lines at rest light every LED. `nirspi camera selftest` finds it while \
          the supply is on",
         DarkAfter::Never,
         &[],
