@@ -1,4 +1,4 @@
-"""The code of docs/python.md runs from top to bottom, in a fresh interpreter, with the packages alone that the page names."""
+"""The code of docs/python.md and docs/coming-from.md runs from top to bottom, in a fresh interpreter, with the packages alone that the page names."""
 
 import pathlib
 import subprocess
@@ -14,6 +14,12 @@ RUNNER = pathlib.Path(__file__).with_name("run_guide.py")
 def run(page, folder):
     command = [sys.executable, "-I", str(RUNNER), str(page)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=900)
+
+
+def test_the_code_for_users_of_other_packages_runs(tmp_path):
+    done = run(ROOT / "docs/coming-from.md", tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("ran: ") == 2, done.stdout
 
 
 def test_the_code_of_the_guide_runs(tmp_path):
