@@ -29,6 +29,14 @@ FAULTS = [
     ("descriptor", "boards/usb/src/lib.rs", "config.max_packet_size_0 = CONTROL_BYTES as u8;", "config.max_packet_size_0 = 32;", "", "it_boots"),
     ("phase", f"{U5}/fpga.rs", "SampleShift::HALF_CYCLE } else", "SampleShift::NONE } else", "", "bit_for_bit"),
     ("stack", f"{U5}/board.rs", "    fn inputs(&mut self) -> Inputs {\n", "    fn inputs(&mut self) -> Inputs {\n        core::hint::black_box(&mut [0_u8; 60_000]);\n", "", "stack_has_room"),
+    # The waits of the start: for ADC, OCTOSPI and USB core.
+    ("watchdog's time", f"{U5}/main.rs", "nirspi_mcu::BOARD_WATCHDOG_US);", "20 * nirspi_mcu::BOARD_WATCHDOG_US);", "", "a_wait_of_the_start"),
+    ("light while USB starts", f"{U5}/main.rs", "    let mut usb_config = usb::Config::default();", "    board.enable_leds(true);\n    let mut usb_config = usb::Config::default();", "", "a_wait_of_the_start"),
+    ("device mode", "boards/otg/src/lib.rs", "        while r.gintsts().read().cmod() {}\n", "", "", "a_wait_of_the_start"),
+    ("light at the start", f"{U5}/main.rs", "Output::new(pins.led_enable, Level::Low,", "Output::new(pins.led_enable, Level::High,", "", "a_wait_of_the_start"),
+    # What the firmware tries before a run.
+    ("training", "mcu/src/training.rs", "Ok(true) if is_whole(room) =>", "Ok(true) =>", "", "wrong_phase"),
+    ("enable of the self-test", "mcu/src/enables.rs", "if self.high == High::BoardAlone { mode::UNLIT } else { 0 };", "0;", "", "stuck_led_enable"),
     ("feed", f"{U5}/board.rs", "self.watchdog.pet();", "", "", "stops_reading"),
     ("pin", f"{U5}/pins.rs", "bits.set_br(14, true)", "bits.set_br(13, true)", "", "crash_while_lit"),
     ("list", f"{U5}/parallel.rs", "number as u32 * u32::from(BLOCK_BYTES)", "number as u32 * u32::from(BLOCK_BYTES / 2)", "parallel", "bit_for_bit"),
@@ -73,7 +81,7 @@ def main() -> int:
         tried = run([program, wanted], cwd=ROOT / "tests/silicon", env={**os.environ, variable: str(elf)})
         seen = tried.returncode != 0
         words = [line for line in tried.stdout.splitlines() if "expected" in line or "assert" in line or '    "' in line]
-        print(f"{name}: {'seen' if seen else 'MISSED'}: {' '.join(words[:3]).strip()[:200]}", flush=True)
+        print(f"{name}: {'seen' if seen else 'MISSED'}: {' '.join(words[:3]).strip()[:600]}", flush=True)
         if not seen:
             missed.append(name)
     print(f"missed: {missed}" if missed else "all seen")

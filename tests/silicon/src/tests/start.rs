@@ -4,8 +4,12 @@ use super::*;
 use crate::camera::{BOARD, elf};
 use crate::chip::OnTheBus;
 use crate::chip::{Ready, map};
+use crate::fpga::Fpga;
 use crate::machine::Stop;
-use nirspi_wire::{RebootInto, State};
+use nirspi_virtual::StuckEnable;
+use nirspi_wire::host_port::{QUAD, READ_PACKET};
+use nirspi_wire::register::DAMAGED;
+use nirspi_wire::{Fault, RebootInto, SelfTestReport, State};
 
 #[test]
 fn it_boots_and_a_host_enumerates_it_at_high_speed() {
@@ -94,15 +98,100 @@ const FROZEN: &[(&str, (u32, u32, u32))] = &[
 fn a_wait_of_the_start_that_never_ends_is_ended_by_the_watchdog_in_the_dark() {
     let stuck = WAITS.iter().map(|&wait| (format!("{wait:?}"), Some(wait), None));
     let frozen = FROZEN.iter().map(|&(name, bits)| (name.to_owned(), None, Some(bits)));
+    // All of them are told, so that a fault shows what it reaches.
+    let mut wrong = Vec::new();
     for (wait, stuck, frozen) in stuck.chain(frozen) {
         let Some(camera) = Camera::start(Plan { stuck, frozen, ..even() }) else { return };
         let (stop, lit, violations) = camera.with(|machine| {
             (machine.run_us(3e6), machine.chip(|chip| chip.light_log.clone()), machine.violations())
         });
-        let is_ended = matches!(stop, Stop::Reset(_));
-        assert!(is_ended, "{wait}: {stop:?}");
-        assert!(lit.is_empty(), "{wait}: {lit:?}");
-        assert!(violations.is_empty(), "{wait}: {violations:?}");
+        if !matches!(stop, Stop::Reset(_)) {
+            wrong.push(format!("{wait} is not ended: {stop:?}"));
+        }
+        if !lit.is_empty() {
+            wrong.push(format!("{wait} is not dark: {lit:?}"));
+        }
+        if let Some(violation) = violations.first() {
+            wrong.push(format!("{wait}: {violation}"));
+        }
+    }
+    assert!(wrong.is_empty(), "expected each to end in the dark: {}", wrong.join("; "));
+}
+
+/// An FPGA whose packet port is sampled a period of `sck` too early: each byte begins with a half of the one before.
+struct Early(Golden<Even>);
+
+impl Fpga for Early {
+    fn advance(&mut self, now_ps: u64) {
+        self.0.advance(now_ps);
+    }
+
+    fn read(&mut self, opcode: u8, address: u16, bytes: usize) -> Vec<u8> {
+        let mut read = self.0.read(opcode, address, bytes);
+        if opcode & !QUAD == READ_PACKET {
+            let mut last = 0;
+            for byte in &mut read {
+                *byte = std::mem::replace(&mut last, *byte) << 4 | *byte >> 4;
+            }
+        }
+        read
+    }
+
+    fn write(&mut self, opcode: u8, address: u16, bytes: &[u8]) -> bool {
+        self.0.write(opcode, address, bytes)
+    }
+
+    fn ready(&mut self) -> (bool, bool) {
+        self.0.ready()
+    }
+
+    fn runs(&self) -> bool {
+        self.0.runs()
+    }
+
+    fn set_board_enable(&mut self, high: bool) {
+        self.0.set_board_enable(high);
+    }
+
+    fn parallel(&mut self, most: usize) -> Vec<u8> {
+        self.0.parallel(most)
+    }
+}
+
+/// Every register answers, so nothing else shows it.
+#[test]
+fn a_packet_port_at_the_wrong_phase_is_named_before_the_first_run() {
+    let plan = Plan::new(|| Box::new(Early(Golden::new(Even::new()))));
+    let Some(camera) = connected_as(plan) else { return };
+    let mut session = Session::open(camera.link()).unwrap();
+    let status = session.status(&mut IgnorePackets).unwrap();
+    let damaged = Fault::FpgaAbsent { identity: DAMAGED };
+    assert_eq!((status.state, status.fault, status.run), (State::Fault, Some(damaged), 0));
+    assert!(camera.with(|machine| machine.chip(|chip| chip.light_log.is_empty())));
+    camera.assert_no_violation();
+}
+
+/// With the board's own pin, which the self-test lowers and raises.
+#[test]
+fn a_stuck_led_enable_is_found_by_the_self_test() {
+    for (stuck, failed) in [
+        (None, 0),
+        (Some(StuckEnable::Board), SelfTestReport::BOARD_ENABLE),
+        (Some(StuckEnable::Fpga), SelfTestReport::FPGA_ENABLE),
+    ] {
+        let plan = Plan::new(move || {
+            let fpga = optics().fpga(SEED).unwrap();
+            Box::new(Golden::new(match stuck {
+                Some(stuck) => fpga.stuck(stuck),
+                None => fpga,
+            }))
+        });
+        let Some(camera) = connected_as(plan) else { return };
+        let mut session = Session::open(camera.link()).unwrap();
+        let report = session.self_test(&mut IgnorePackets).unwrap();
+        assert_eq!(report.failed, failed, "{stuck:?}");
+        assert!(!is_lit(&camera));
+        camera.assert_no_violation();
     }
 }
 
