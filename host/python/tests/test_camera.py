@@ -130,6 +130,7 @@ def test_a_kept_flat_field_of_a_camera_is_used(cli, tmp_path, monkeypatch):
     server = subprocess.Popen(
         [
             cli,
+            "dev",
             "virtual",
             "--listen",
             "127.0.0.1:0",
@@ -146,7 +147,10 @@ def test_a_kept_flat_field_of_a_camera_is_used(cli, tmp_path, monkeypatch):
     try:
         address = next(m[0] for line in server.stdout if (m := re.search(r"tcp:[0-9.:]*[0-9]", line)))
         made = subprocess.run(
-            [cli, "camera", "calibrate", "--camera", address, "--white"], capture_output=True, text=True, check=False
+            [cli, "camera", "calibrate", "--camera", address, "--white"],
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert made.returncode == 0, made.stderr
         with ns.Camera(address) as camera:

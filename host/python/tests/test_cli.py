@@ -93,7 +93,9 @@ def test_metrics(cli, tmp_path, random):
     a, b = random.random((2, 3, 32, 32), np.float32)
     np.save(tmp_path / "a.npy", a)
     np.save(tmp_path / "b.npy", b * 3 - 1)
-    report = json.loads(run(cli, "metrics", tmp_path / "a.npy", tmp_path / "b.npy", "--align", "gain-offset", "--json"))
+    report = json.loads(
+        run(cli, "metrics", tmp_path / "a.npy", tmp_path / "b.npy", "--align", "gain-offset", "--json")
+    )
     found = ns.metrics.compare(a, b * 3 - 1, align="gain-offset")
     assert [one["psnr_db"] for one in report["each"]] == found["psnr_db"].tolist()
     assert [one["ssim"] for one in report["each"]] == found["ssim"].tolist()
@@ -116,13 +118,17 @@ def test_rain_and_spheres(cli):
     assert report.pop("provenance")["origin"] == "simulated"
     found = ns.rain.extinction(5.6, wavelengths_nm=[550, 850, 1550], drops="mono:2")
     assert found == report
-    sphere = json.loads(run(cli, "physics", "sphere", "--x", "100", "--m-re", "1.33", "--m-im", "1e-4", "--json"))
+    sphere = json.loads(
+        run(cli, "physics", "sphere", "--x", "100", "--m-re", "1.33", "--m-im", "1e-4", "--json")
+    )
     assert sphere.pop("provenance")["origin"] == "simulated"
     assert ns.rain.mie(100, 1.33 + 1e-4j) == sphere
 
 
 def test_a_camera_description(cli):
-    assert ns.CameraModel("one-metre").report == json.loads(run(cli, "camera", "model", "one-metre", "--json"))
+    assert ns.CameraModel("one-metre").report == json.loads(
+        run(cli, "camera", "model", "one-metre", "--json")
+    )
 
 
 def test_measurements_of_other_groups(cli, data, tmp_path):
