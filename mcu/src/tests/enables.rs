@@ -39,6 +39,25 @@ fn each_enable_is_tried_alone_and_then_both() {
     }
 }
 
+/// The pin changes after a poll, and the array's gates need a moment.
+#[test]
+fn each_run_begins_a_millisecond_after_the_change_of_the_boards_pin() {
+    let mut bench = Bench::open();
+    bench.fpga.instant = true;
+    bench.send(Command::SelfTest);
+    let (mut last, mut pins, mut changed) = (0, bench.fpga.pin, bench.now);
+    for _ in 0..400 {
+        bench.after(25);
+        let runs = bench.fpga.of_pattern_0.len();
+        assert!(runs == last || bench.now.since(changed).0 >= 1_000, "run {runs}");
+        if bench.fpga.pin != pins {
+            (pins, changed) = (bench.fpga.pin, bench.now);
+        }
+        last = runs;
+    }
+    assert_eq!(last, 3);
+}
+
 #[test]
 fn both_enables_are_high_only_after_each_has_kept_the_array_dark() {
     for (stuck, expected) in [

@@ -95,6 +95,20 @@ fn a_packet_that_comes_damaged_each_time_is_named_before_the_first_run() {
     }
 }
 
+/// A packet of other words, whose checksum is right: a line that both ends take for another, for example.
+#[test]
+fn the_words_of_the_packet_count_as_its_checksum_does() {
+    let mut bench = unpolled();
+    packet_of(&mut bench);
+    bench.fpga.registers.insert(Register::Latency.address(), 4);
+    (bench.fpga.frame, bench.fpga.made, bench.fpga.running) = (None, 0, true);
+    bench.fpga.make_frame();
+    for _ in 0..3 {
+        bench.poll();
+    }
+    assert_eq!(bench.camera.machine().fault, Some(fpga::UNREADABLE));
+}
+
 #[test]
 fn one_damaged_attempt_is_no_wrong_phase() {
     let mut bench = unpolled();
