@@ -53,12 +53,14 @@ module safety (
     logic [2:0]  fault_before;
     logic        forgotten;
     logic        lines_were_up_in_the_dark;
+    logic        was_unlit;
 
     always_ff @(posedge clk) begin
         was_open     <= !interlock;
         was_reset    <= rst;
         fault_before <= dut.fault;
         forgotten    <= rst || dut.clear;
+        was_unlit    <= dut.settings.unlit;
         lines_were_up_in_the_dark <= !enable && (rows != 0 || columns != 0);
         if (rst) begin
             silent <= EVER;
@@ -88,7 +90,7 @@ module safety (
         dark_when_host_silent: assert (!(enable && silent > limit + DEPTH));
         dark_when_unlit:       assert (!(enable && dut.settings.unlit && !dut.halt));
         lines_low_when_dark:   assert (enable || !lines_were_up_in_the_dark || rows == 0 && columns == 0
-            || dut.settings.unlit && (dut.running || coming || dut.halt));
+            || dut.settings.unlit && (dut.running || coming) || was_unlit && dut.halt);
         fault_latched:         assert (fault_before == 0 || dut.fault == fault_before || forgotten);
 
 `ifdef INDUCTION
