@@ -129,6 +129,10 @@ fn silenced(camera: VirtualCamera<OpticalFpga>) -> VirtualCamera<OpticalFpga> {
     let silence = Micros(1_000);
     let limits = Limits { host_silence: silence, ..Limits::default() };
     let mut camera = camera.with_limits(limits);
+    // The firmware compares a packet of the FPGA first, and takes no command meanwhile.
+    for _ in 0..50 {
+        camera.step(1000);
+    }
     let mut send = |id, command: Command<'_>| {
         let mut room = [0; 4096];
         camera.receive(encode(&Request { id, command }, &mut room).unwrap());
