@@ -50,3 +50,19 @@ pub fn column(page: &str, heading: &str, title: &str) -> BTreeMap<String, String
     let cell = |row: Vec<String>| Some((row.first()?.clone(), row.get(at)?.clone()));
     table(page, heading).into_iter().filter_map(cell).collect()
 }
+
+/// A page without its fenced blocks.
+#[must_use]
+pub fn unfenced(page: &str) -> String {
+    let mut is_fenced = false;
+    let mut kept = String::new();
+    for line in page.lines() {
+        if line.trim_start().starts_with("```") {
+            is_fenced = !is_fenced;
+        } else if !is_fenced {
+            kept.push_str(line);
+            kept.push('\n');
+        }
+    }
+    kept
+}

@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use nirspi_tests::pages::unfenced;
 use nirspi_tests::root;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,21 +13,6 @@ const BOOKS: [&str; 2] = ["docs", "docs/log"];
 
 fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-/// A page without its fenced blocks.
-fn unfenced(page: &str) -> String {
-    let mut is_fenced = false;
-    let mut kept = String::new();
-    for line in page.lines() {
-        if line.trim_start().starts_with("```") {
-            is_fenced = !is_fenced;
-        } else if !is_fenced {
-            kept.push_str(line);
-            kept.push('\n');
-        }
-    }
-    kept
 }
 
 /// The place after the code that a run of this many backticks has begun.

@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use nirspi_tests::pages::unfenced;
 use nirspi_tests::root;
 use std::path::Path;
 
@@ -29,21 +30,6 @@ struct Page {
 struct Prose {
     words: usize,
     numbers: usize,
-}
-
-/// The page without its blocks of code and comments.
-fn text(page: &str) -> String {
-    let mut is_code = false;
-    let mut kept = String::new();
-    for line in page.lines() {
-        if line.trim_start().starts_with("```") {
-            is_code = !is_code;
-        } else if !is_code && !line.starts_with("<!--") {
-            kept.push_str(line);
-            kept.push('\n');
-        }
-    }
-    kept
 }
 
 fn has_letter_or_digit(word: &&str) -> bool {
@@ -105,7 +91,7 @@ fn pages() -> Vec<Page> {
             if Path::new(&name).extension().is_some_and(|kind| kind == "md")
                 && !GENERATED.contains(&name.as_str())
             {
-                let text = text(&std::fs::read_to_string(docs.join(&name)).unwrap());
+                let text = unfenced(&std::fs::read_to_string(docs.join(&name)).unwrap());
                 let words = text.split_whitespace().filter(has_letter_or_digit).count();
                 found.push(Page {
                     is_reference: part == "Reference",
@@ -155,6 +141,6 @@ fn sentences_carry_few_numbers() {
 #[test]
 fn numbers_are_counted_as_a_reader_sees_them() {
     let page = "1. Show 32 x 32 pixels (5 V) on `12` lines\n\n| 1 | 2 |\n\nSee [3 of LD1](log/9.md#8), -2.5 dB in **Eq. (1)**.\n";
-    let Prose { words, numbers } = prose(&text(page));
+    let Prose { words, numbers } = prose(&unfenced(page));
     assert_eq!((words, numbers), (18, 4));
 }
