@@ -57,6 +57,15 @@ enum Piece {
     Lost,
 }
 
+/// Refuses a burst that is empty, or longer than the FPGA records.
+pub(crate) fn check(samples: u16) -> Result<(), Refusal> {
+    if (1..=RAW_SAMPLES_MAX).contains(&samples) {
+        Ok(())
+    } else {
+        Err(Refusal::RawLength { max: RAW_SAMPLES_MAX })
+    }
+}
+
 impl Burst {
     /// `RawBurst`: checks that the FPGA still holds `setup`, and starts the one sweep that is recorded.
     ///
@@ -68,9 +77,7 @@ impl Burst {
         limits: &Limits,
         bus: &mut impl FpgaBus,
     ) -> Result<Self, Refusal> {
-        if !(1..=RAW_SAMPLES_MAX).contains(&samples) {
-            return Err(Refusal::RawLength { max: RAW_SAMPLES_MAX });
-        }
+        check(samples)?;
         fpga::verify(bus, setup, limits)
             .and_then(|()| Ok(fpga::write(bus, Register::RawLength, samples.into())?))
             .map_err(|_| fpga::health(bus).err().unwrap_or(Fault::FpgaConfiguration))

@@ -142,9 +142,10 @@ impl Camera {
         self.machine.state()
     }
 
-    /// Whether the board's own LED-enable pin may be high: from a configuration until a fault, the
-    /// end of the session, or a stop that the FPGA has not confirmed; and in a part of the self-test. The board sets the pin after every
-    /// [`poll`](Self::poll) (`tests::model::every_reachable_state_keeps_the_laws_of_light`).
+    /// Whether the board's own LED-enable pin may be high: from a configuration until a fault, the end of the session, or a
+    /// stop that the FPGA has not confirmed; and in a part of the test of the LED enables, before which a configuration
+    /// leaves the pin low. The board sets the pin after every [`poll`](Self::poll)
+    /// (`tests::model::every_reachable_state_keeps_the_laws_of_light`).
     #[must_use]
     pub fn may_light(&self) -> bool {
         self.machine.may_light()

@@ -7,6 +7,7 @@
 //!   the bus ([`Refusal::Bus`]) leaves the FPGA without a configuration
 //!   (`tests::commands::settings_that_do_not_arrive_leave_nothing_configured`).
 
+use crate::enables::Asked;
 use crate::machine::{Activity, Machine, Session};
 use crate::notices::{Notice, Outcome};
 use crate::training::Port;
@@ -36,7 +37,7 @@ impl Machine {
             Command::Configure(configuration) => {
                 self.configure(now, &configuration, inputs, *bus).map(|()| Answer::Done)
             }
-            Command::Start(length) => self.start_run(now, length, *bus).map(|()| Answer::Done),
+            Command::Start(length) => return self.light_up(id, now, Asked::Run(length), *bus),
             Command::Stop => return self.stop(id, now, *bus, Outcome::DONE),
             Command::Status => Ok(Answer::Status(self.status(now, inputs, *bus))),
             Command::SelfTest => match self.state() {
@@ -48,7 +49,7 @@ impl Machine {
                 .load_gateware(&chunk, *bus, *loader)
                 .map(|next_offset| Answer::Gateware { next_offset }),
             Command::RawBurst { samples } => {
-                self.start_burst(now, samples, *bus).map(|()| Answer::Done)
+                return self.light_up(id, now, Asked::Burst(samples), *bus);
             }
             Command::Reboot(into) => {
                 self.reboot = Some(into);
@@ -188,7 +189,7 @@ impl Machine {
         let next_offset = gateware::take(&mut self.loading, chunk, loader)?;
         // The first piece makes the FPGA forget its settings.
         self.setup = None;
-        self.port = Port::Unknown(Micros(0));
+        self.forget_fpga(Micros(0));
         Ok(next_offset)
     }
 }

@@ -1,6 +1,9 @@
 //! Whether each of the two LED enables keeps the array dark alone. While both work, a stuck one shows nowhere: the other
 //! still switches the LEDs on and off.
 //!
+//! The self-test asks, and so does the first light after power-up, after gateware was loaded and after the FPGA was absent:
+//! a run or a raw burst begins once both enables are sound. [`Limits::tries_enables`] says whether a board does that.
+//!
 //! All LEDs go on and off in slots of two microseconds, three times for 0.3 milliseconds, and the detector says whether
 //! their light follows:
 //!
@@ -10,7 +13,8 @@
 //! | high | low: the run is without light ([`mode::UNLIT`]) | nothing |
 //! | high | high in the run | light |
 //!
-//! Without light in the third run the darkness of the first two proves nothing, and both checks are left out.
+//! Without light in the third run the darkness of the first two proves nothing: the self-test leaves both checks out, and a
+//! run begins all the same, because a dark scene is no fault. The next one asks again.
 //!
 //! # Invariant
 //! Both enables are high together only after each of them has kept the array dark alone
@@ -18,13 +22,13 @@
 
 use crate::configure::Setup;
 use crate::test_frame::{begin, look};
-use crate::{FpgaBus, Limits, Micros};
+use crate::{FpgaBus, Limits, Micros, burst, run};
 use nirspi_wire::fpga::FpgaFrame;
 use nirspi_wire::register::mode;
-use nirspi_wire::{Fault, FrameFlags, SelfTestReport};
+use nirspi_wire::{Fault, FrameFlags, Refusal, RunLength, SelfTestReport};
 
-/// Time from a change of the board's pin to the run: the pin changes after the poll, and the array's gates follow within
-/// microseconds.
+/// Time from the poll that changes the board's pin to the run: the pin changes after the poll, and the array's gates follow
+/// within microseconds.
 const SETTLE: Micros = Micros(1_000);
 
 /// Pattern 0 and its complement: all LEDs, none. Sweeps alternate, so that the charge of the lines cancels. The samples
@@ -58,16 +62,45 @@ enum High {
     Both,
 }
 
+/// Light that a host asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Asked {
+    Run(RunLength),
+    /// A raw burst of this many samples.
+    Burst(u16),
+}
+
+impl Asked {
+    /// Refuses a length that no run or burst has.
+    pub fn check(self) -> Result<(), Refusal> {
+        match self {
+            Self::Run(length) => run::frames(length).map(|_| ()),
+            Self::Burst(samples) => burst::check(samples),
+        }
+    }
+}
+
+/// What the test is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// The self-test, with the checks before.
+    Report(SelfTestReport),
+    /// The first light, which follows.
+    First(Asked),
+}
+
 /// A test of the enables in progress.
 #[derive(Debug)]
 #[cfg_attr(test, derive(Clone))]
 pub(crate) struct Enables {
-    id: u16,
-    report: SelfTestReport,
+    /// The command that waits for the reply.
+    pub id: u16,
+    pub purpose: Purpose,
     high: High,
     /// The run has begun. Before, the board's pin settles.
     shows: bool,
-    since: Micros,
+    /// The poll that began the run, or after which the pin has changed; `None` before the first poll.
+    since: Option<Micros>,
 }
 
 /// How the test has ended.
@@ -96,15 +129,26 @@ fn light_counts(bytes: &[u8]) -> Option<u64> {
 }
 
 impl Enables {
-    /// `report` holds the checks before; `id` is the command that waits for the reply.
-    pub fn new(id: u16, report: SelfTestReport, now: Micros) -> Self {
-        Self { id, report, high: High::FpgaAlone, shows: false, since: now }
+    pub fn new(id: u16, purpose: Purpose) -> Self {
+        Self { id, purpose, high: High::FpgaAlone, shows: false, since: None }
     }
 
     /// What the rest of the test depends on, with ages for times.
     #[cfg(test)]
-    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 4] {
-        [self.id.into(), self.high as u64, self.shows.into(), age(self.since)]
+    pub fn key(&self, age: impl Fn(Micros) -> u64) -> [u64; 5] {
+        let purpose = match self.purpose {
+            Purpose::Report(_) => 0,
+            Purpose::First(Asked::Run(RunLength::Continuous)) => 1,
+            Purpose::First(Asked::Run(RunLength::Frames(frames))) => 2 + u64::from(frames),
+            Purpose::First(Asked::Burst(samples)) => u64::MAX - u64::from(samples),
+        };
+        [
+            self.id.into(),
+            self.high as u64,
+            self.shows.into(),
+            self.since.map_or(u64::MAX, age),
+            purpose,
+        ]
     }
 
     /// Level of the board's own LED enable.
@@ -119,8 +163,9 @@ impl Enables {
         bus: &mut impl FpgaBus,
         limits: &Limits,
     ) -> Option<Verdict> {
+        let since = *self.since.get_or_insert(now);
         if !self.shows {
-            if now.since(self.since) < SETTLE {
+            if now.since(since) < SETTLE {
                 return None;
             }
             let unlit = if self.high == High::BoardAlone { mode::UNLIT } else { 0 };
@@ -128,10 +173,10 @@ impl Enables {
             if !begin(bus, &setup, limits) {
                 return Some(Verdict::NoFrame);
             }
-            (self.shows, self.since) = (true, now);
+            (self.shows, self.since) = (true, Some(now));
             return None;
         }
-        let Some(counts) = look(now, self.since, bus, light_counts)?.flatten() else {
+        let Some(counts) = look(now, since, bus, light_counts)?.flatten() else {
             return Some(Verdict::NoFrame);
         };
         let is_dark = counts < DARK_COUNTS;
@@ -143,23 +188,22 @@ impl Enables {
             High::Both if counts < LIGHT_COUNTS => return Some(Verdict::NoLight),
             High::Both => return Some(Verdict::Sound),
         };
-        (self.shows, self.since) = (false, now);
+        (self.shows, self.since) = (false, Some(now));
         None
     }
+}
 
-    /// The number of the command to answer, and the whole report.
-    pub fn verdict(&self, verdict: Verdict) -> (u16, SelfTestReport) {
-        use SelfTestReport as Report;
-        const BOTH: u32 = Report::BOARD_ENABLE | Report::FPGA_ENABLE;
-        let (ran, failed) = match verdict {
-            Verdict::Sound => (BOTH, 0),
-            Verdict::Stuck(Fault::BoardEnableStuck) => (Report::BOARD_ENABLE, Report::BOARD_ENABLE),
-            // The light shows that the darkness before was that of the board's enable.
-            Verdict::Stuck(_) => (BOTH, Report::FPGA_ENABLE),
-            Verdict::NoLight => (0, 0),
-            Verdict::NoFrame => (0, Report::TEST_FRAME),
-        };
-        let Report { ran: before, failed: failed_before } = self.report;
-        (self.id, Report { ran: before | ran, failed: failed_before | failed })
-    }
+/// The report of a self-test whose checks before are `before`.
+pub(crate) fn report(verdict: Verdict, before: SelfTestReport) -> SelfTestReport {
+    use SelfTestReport as Report;
+    const BOTH: u32 = Report::BOARD_ENABLE | Report::FPGA_ENABLE;
+    let (ran, failed) = match verdict {
+        Verdict::Sound => (BOTH, 0),
+        Verdict::Stuck(Fault::BoardEnableStuck) => (Report::BOARD_ENABLE, Report::BOARD_ENABLE),
+        // The light shows that the darkness before was that of the board's enable.
+        Verdict::Stuck(_) => (BOTH, Report::FPGA_ENABLE),
+        Verdict::NoLight => (0, 0),
+        Verdict::NoFrame => (0, Report::TEST_FRAME),
+    };
+    Report { ran: before.ran | ran, failed: before.failed | failed }
 }

@@ -44,6 +44,9 @@ pub struct Limits {
     /// The FPGA ends a run after this many clocks of 8 ns without an access from the firmware; 1 to
     /// [`register::WATCHDOG_MAX`], and longer than `running_check`.
     pub watchdog_clocks: u32,
+    /// The first light waits until each of the two LED enables has kept the array dark alone. Simulated cameras do not, so
+    /// that the noise of a seed is that of the run alone.
+    pub tries_enables: bool,
 }
 
 impl Default for Limits {
@@ -77,7 +80,11 @@ impl Limits {
         running_check: Micros(1_000),
         resting_check: Micros(100_000),
         watchdog_clocks: ADC_HZ / 5,
+        tries_enables: true,
     };
+
+    /// Those of the reference board, for a camera whose LEDs are simulated.
+    pub const SIMULATED: Self = Self { tries_enables: false, ..Self::REFERENCE };
 
     /// Light that the FPGA allows in each window; the full array lit costs 2 a clock.
     pub(crate) fn duty_budget(&self) -> u32 {

@@ -11,7 +11,7 @@
 
 use crate::burst::{self, Burst};
 use crate::configure::Setup;
-use crate::enables::{self, Enables};
+use crate::enables::{self, Asked, Enables, Purpose};
 use crate::gateware::Loading;
 use crate::meter::Meter;
 use crate::notices::{Notice, Notices, Outcome};
@@ -65,6 +65,8 @@ pub(crate) struct Machine {
     pub loading: Option<Loading>,
     /// Whether packets are known to come whole over the packet port.
     pub port: Port,
+    /// Each LED enable has kept the array dark alone.
+    pub enables_sound: bool,
     pub reboot: Option<RebootInto>,
     /// The crash that ended the last start, until a host has got the crash report.
     pub crash: Option<Crash>,
@@ -101,6 +103,7 @@ impl Machine {
             meter: Meter::new(),
             loading: None,
             port: Port::Unknown(Micros(0)),
+            enables_sound: false,
             reboot: None,
             crash: None,
             clock_counts: false,
@@ -132,7 +135,7 @@ impl Machine {
         }
         match &self.activity {
             Activity::Resting | Activity::Training(_) | Activity::TestFrame(_) => {
-                self.setup.is_some()
+                self.setup.is_some() && (self.enables_sound || !self.limits.tries_enables)
             }
             Activity::Run(_) | Activity::Burst(_) => true,
             Activity::Enables(enables) => enables.pin(),
@@ -191,7 +194,7 @@ impl Machine {
             self.notify(now, EventKind::Fault(fault));
         }
         if matches!(fault, Fault::FpgaAbsent { .. }) {
-            self.port = Port::Unknown(now);
+            self.forget_fpga(now);
         }
         match &mut self.activity {
             Activity::Resting => {}
@@ -203,6 +206,12 @@ impl Machine {
         }
     }
 
+    /// What was known of an FPGA that is gone, or gets other gateware.
+    pub fn forget_fpga(&mut self, now: Micros) {
+        self.port = Port::Unknown(now);
+        self.enables_sound = false;
+    }
+
     /// A start failed: an FPGA that did not take the start is a fault, any other refusal changes nothing.
     fn refused_start(&mut self, now: Micros, refusal: Refusal, bus: &mut impl FpgaBus) -> Refusal {
         if let Refusal::Fault(fault) = refusal {
@@ -211,8 +220,38 @@ impl Machine {
         refusal
     }
 
-    /// `Start`.
-    pub fn start_run(
+    /// `Start` or `RawBurst`. The reply to the first one comes after the test of the LED enables.
+    pub fn light_up(&mut self, id: u16, now: Micros, asked: Asked, bus: &mut impl FpgaBus) {
+        let is_due = self.limits.tries_enables
+            && !self.enables_sound
+            && self.ready_setup().is_ok()
+            && asked.check().is_ok()
+            // The bring-up design has no LEDs, and sees the levels of its own pins.
+            && fpga::design(bus) == Ok(Design::Camera);
+        if is_due {
+            self.activity = Activity::Enables(Enables::new(id, Purpose::First(asked)));
+            self.release_pending = false;
+        } else {
+            let outcome = self.show(now, asked, bus);
+            self.reply(id, Outcome::Other(outcome));
+        }
+    }
+
+    fn show(
+        &mut self,
+        now: Micros,
+        asked: Asked,
+        bus: &mut impl FpgaBus,
+    ) -> Result<Answer<'static>, Refusal> {
+        match asked {
+            Asked::Run(length) => self.start_run(now, length, bus),
+            Asked::Burst(samples) => self.start_burst(now, samples, bus),
+        }
+        .map(|()| Answer::Done)
+    }
+
+    /// A run of frames.
+    fn start_run(
         &mut self,
         now: Micros,
         length: RunLength,
@@ -288,8 +327,7 @@ impl Machine {
         self.notify(now, event);
     }
 
-    /// `RawBurst`.
-    pub fn start_burst(
+    fn start_burst(
         &mut self,
         now: Micros,
         samples: u16,
@@ -352,7 +390,7 @@ impl Machine {
         // The bring-up design has no LEDs, and sees the levels of its own pins.
         if passed && fpga::design(bus) == Ok(Design::Camera) {
             let (id, report) = test.verdict(passed);
-            self.activity = Activity::Enables(Enables::new(id, report, now));
+            self.activity = Activity::Enables(Enables::new(id, Purpose::Report(report)));
         } else {
             self.finish_test(passed, bus);
         }
@@ -378,12 +416,20 @@ impl Machine {
 
     fn finish_enables(&mut self, now: Micros, verdict: enables::Verdict, bus: &mut impl FpgaBus) {
         let Activity::Enables(enables) = &self.activity else { return };
-        let (id, report) = enables.verdict(verdict);
+        let (id, purpose) = (enables.id, enables.purpose);
         self.rest(bus);
-        if let enables::Verdict::Stuck(fault) = verdict {
-            self.trip(now, fault, bus);
+        match verdict {
+            enables::Verdict::Stuck(fault) => self.trip(now, fault, bus),
+            enables::Verdict::Sound => self.enables_sound = true,
+            enables::Verdict::NoLight | enables::Verdict::NoFrame => {}
         }
-        self.reply(id, Outcome::Other(Ok(Answer::SelfTest(report))));
+        let outcome = match (purpose, self.fault) {
+            (Purpose::Report(before), _) => Ok(Answer::SelfTest(enables::report(verdict, before))),
+            (Purpose::First(_), Some(fault)) => Err(Refusal::Fault(fault)),
+            (Purpose::First(_), None) if verdict == enables::Verdict::NoFrame => Err(Refusal::Bus),
+            (Purpose::First(asked), None) => self.show(now, asked, bus),
+        };
+        self.reply(id, Outcome::Other(outcome));
     }
 
     /// Begins a training if one is due and nothing forbids a start; true if it has begun.

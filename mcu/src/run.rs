@@ -189,6 +189,19 @@ pub(crate) struct Ended {
     pub event: EventKind,
 }
 
+/// The value of [`Register::Frames`]. A run of no frames is refused.
+pub(crate) fn frames(length: RunLength) -> Result<u32, Refusal> {
+    match length {
+        // In the FPGA's register 0 means a run without end.
+        RunLength::Continuous => Ok(0),
+        RunLength::Frames(frames) => {
+            configure::in_range(ConfigField::Frames, frames, 1, u32::MAX)
+                .map_err(Refusal::Configuration)?;
+            Ok(frames)
+        }
+    }
+}
+
 impl Run {
     /// `Start`: checks that the FPGA still holds `setup`, and switches the LEDs on.
     ///
@@ -200,15 +213,7 @@ impl Run {
         limits: &Limits,
         bus: &mut impl FpgaBus,
     ) -> Result<Self, Refusal> {
-        // In the FPGA's register 0 means a run without end.
-        let frames = match length {
-            RunLength::Continuous => 0,
-            RunLength::Frames(frames) => {
-                configure::in_range(ConfigField::Frames, frames, 1, u32::MAX)
-                    .map_err(Refusal::Configuration)?;
-                frames
-            }
-        };
+        let frames = frames(length)?;
         let started = fpga::verify(bus, setup, limits)
             .and_then(|()| Ok(fpga::write(bus, Register::Frames, frames)?))
             .and_then(|()| Ok(fpga::stamp(bus, number, now)?))

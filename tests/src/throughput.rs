@@ -291,7 +291,7 @@ pub fn stretch<P: TimedPort>(
     let mut buffer = [0; MAX_FRAME_BYTES];
     let mut bus = PortBus::new(Costly { port, processor }, &mut buffer);
     let info = BoardInfo::new("timed", "", Version(0, 0, 0));
-    let mut camera = Camera::new(info, Limits::default());
+    let mut camera = Camera::new(info, Limits::SIMULATED);
     let mut host = Host {
         room: vec![0; MAX_FRAME_BYTES],
         packets: Vec::new(),

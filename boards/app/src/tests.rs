@@ -43,7 +43,7 @@ impl Bench {
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
             loader: FakeLoader(Rc::clone(&pins)),
             info: board_info("bench", "0001"),
-            limits: Limits::default(),
+            limits: Limits::SIMULATED,
             crash: None,
             restarts: 0,
         };

@@ -131,7 +131,7 @@ async fn camera(board: Emulated, link: CameraEnd<'static>) -> ! {
         frame: FRAME.take(),
         loader: NoLoader,
         info: board_info("mps2-an505", "QEMU"),
-        limits: Limits::default(),
+        limits: Limits::SIMULATED,
         crash: crash::take(),
         restarts: 0,
     };

@@ -127,7 +127,7 @@ fn enclosed(hands: &Arc<Hands>, before: Before) -> Connected {
 /// A camera whose host has asked for light and then for nothing.
 fn silenced(camera: VirtualCamera<OpticalFpga>) -> VirtualCamera<OpticalFpga> {
     let silence = Micros(1_000);
-    let limits = Limits { host_silence: silence, ..Limits::default() };
+    let limits = Limits { host_silence: silence, ..Limits::SIMULATED };
     let mut camera = camera.with_limits(limits);
     // The firmware compares a packet of the FPGA first, and takes no command meanwhile.
     for _ in 0..50 {

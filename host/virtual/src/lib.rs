@@ -166,7 +166,7 @@ impl<F: SimulatedFpga, G: GatewareLoader> VirtualCamera<F, G> {
     }
 
     fn powered_up(fpga: F, loader: G, depth: SimulatedDepth, info: BoardInfo) -> Self {
-        let limits = Limits::default();
+        let limits = Limits::SIMULATED;
         Self {
             camera: Camera::new(info.clone(), limits),
             info,

@@ -50,7 +50,7 @@ fn the_longest_identity_fits_its_packet() {
     let mut bench = Bench::new();
     let long = "N".repeat(40);
     let info = crate::BoardInfo::new(&long, &long, Version(255, 255, 255));
-    bench.camera = crate::Camera::new(info, crate::Limits::default());
+    bench.camera = crate::Camera::new(info, crate::Limits::SIMULATED);
     bench.fpga.registers.insert(Register::Version.address(), 0x00FF_FFFF);
     bench.next_id = u16::MAX - 1;
     let Ok(Answer::Hello(identity)) = bench.ask(Command::Hello { protocol: version::CURRENT })

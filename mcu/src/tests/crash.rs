@@ -31,7 +31,7 @@ fn hello(bench: &mut Bench, protocol: u16) -> Vec<(u64, String)> {
 fn crashed() -> Bench {
     let mut bench = Bench::new();
     let info = BoardInfo::new("bench", "0001", Version(1, 2, 3));
-    bench.camera = Camera::new(info, Limits::default());
+    bench.camera = Camera::new(info, Limits::SIMULATED);
     bench.camera.restarted_after(crash());
     bench.train();
     bench

@@ -293,7 +293,7 @@ pub(super) struct Device {
 impl Device {
     pub(super) fn new(bus: PortBus<'static, Port>) -> Self {
         let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
-        let camera = Camera::new(info, Limits::default());
+        let camera = Camera::new(info, Limits::SIMULATED);
         let mut device =
             Self { camera, bus, link: Link::default(), now: Micros(1_000), transfer_us: 0 };
         // The packet of the training.
@@ -402,7 +402,7 @@ fn a_run_of_frames_that_come_slowly_goes_on() {
     device.ask(Command::Configure(SMALL));
     device.ask(Command::Start(RunLength::Continuous));
     // The transfer takes longer than the patience with an FPGA that makes no frame.
-    device.transfer_us = Limits::default().stall_min.0 + 50_000;
+    device.transfer_us = Limits::SIMULATED.stall_min.0 + 50_000;
     for _ in 0..5 {
         device.bus.port().fpga.make_frame();
         device.turn(&[]);

@@ -18,7 +18,7 @@ use std::vec::Vec;
 const FULL: Configuration<'static> = Configuration { patterns: PATTERNS, ..SMALL };
 
 fn setup(configuration: Configuration<'static>) -> Setup {
-    configure::check(&configuration, &Limits::default()).unwrap()
+    configure::check(&configuration, &Limits::SIMULATED).unwrap()
 }
 
 /// What the packet of a frame says, and its samples over range.

@@ -6,7 +6,7 @@ use crate::tests::support::{Link, SMALL};
 
 #[test]
 fn a_run_of_one_frame_sends_the_frame_and_ends_when_it_is_through() {
-    let (mut bus, mut link, limits) = (FakeFpga::default(), Link::default(), Limits::default());
+    let (mut bus, mut link, limits) = (FakeFpga::default(), Link::default(), Limits::SIMULATED);
     let setup = configure::check(&SMALL, &limits).unwrap();
     fpga::set(&mut bus, &setup, &limits).unwrap();
     let mut run =

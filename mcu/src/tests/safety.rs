@@ -210,7 +210,7 @@ fn a_run_of_long_frames_is_given_the_time_of_eight() {
 
 #[test]
 fn a_silent_host() {
-    let limit = Limits::default().host_silence.0;
+    let limit = Limits::SIMULATED.host_silence.0;
     let mut bench = Bench::running(RunLength::Continuous);
     for _ in 0..limit / 10_000 {
         bench.fpga.make_frame();

@@ -50,6 +50,7 @@ fn the_test_frame_is_one_sweep_and_nothing_is_taken_meanwhile() {
     bench.fpga.make_frame();
     // The LED enables follow, whose frames do not come here.
     bench.poll();
+    bench.poll();
     assert_eq!(bench.receive(&packet(9, Command::Status)), 0);
     assert_eq!(bench.camera.state(), State::Running);
     bench.after(1_000);

@@ -8,7 +8,7 @@ use std::vec::Vec;
 
 /// Twice the time after which a silent host ends a run, with a frame each 10 ms and these bytes each second.
 fn two_silences_with(bench: &mut Bench, bytes: &[u8]) {
-    let limit_us = Limits::default().host_silence.0;
+    let limit_us = Limits::SIMULATED.host_silence.0;
     for step in 0..2 * limit_us / 10_000 {
         if step % 100 == 0 {
             bench.receive(bytes);

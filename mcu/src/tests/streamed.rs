@@ -33,7 +33,7 @@ impl Device {
     fn new() -> Self {
         let info = BoardInfo::new("bench", "0001", nirspi_wire::Version(1, 2, 3));
         let bus = PortBus::new(Wired::new(), Box::leak(Box::new([0; MAX_FRAME_BYTES])));
-        let camera = Camera::new(info, Limits::default());
+        let camera = Camera::new(info, Limits::SIMULATED);
         let mut device = Self { camera, bus, link: Link::default(), now: Micros(1_000) };
         // The packet of the training comes by the host port.
         for _ in 0..9 {

@@ -154,11 +154,18 @@ pub const SMALL: Configuration<'static> = Configuration {
 
 impl Bench {
     /// A bench after power-up and the first polls.
+    ///
+    /// Its first light waits for no test of the LED enables, so that each test here has its own runs alone.
     pub fn new() -> Self {
+        Self::with(Limits::SIMULATED)
+    }
+
+    /// The same with these limits.
+    pub fn with(limits: Limits) -> Self {
         let info =
             BoardInfo::new("bench", "0001", Version(1, 2, 3)).can(Capabilities::LOAD_GATEWARE);
         let mut bench = Self {
-            camera: Camera::new(info, Limits::default()),
+            camera: Camera::new(info, limits),
             fpga: FakeFpga::default(),
             link: Link::default(),
             loader: Loader::default(),
@@ -183,10 +190,15 @@ impl Bench {
 
     /// A bench with a session.
     pub fn open() -> Self {
-        let mut bench = Self::new();
+        Self::new().opened()
+    }
+
+    /// The same with a session.
+    pub fn opened(mut self) -> Self {
+        let bench = &mut self;
         let answer = bench.ask(Command::Hello { protocol: version::CURRENT });
         assert!(matches!(answer, Ok(Answer::Hello(_))), "{answer:?}");
-        bench
+        self
     }
 
     /// A bench with a configuration.

@@ -14,7 +14,7 @@ use std::vec::Vec;
 fn unpolled() -> Bench {
     let mut bench = Bench::new();
     let info = BoardInfo::new("bench", "0001", Version(1, 2, 3)).can(Capabilities::LOAD_GATEWARE);
-    bench.camera = Camera::new(info, Limits::default());
+    bench.camera = Camera::new(info, Limits::SIMULATED);
     bench.fpga.reset();
     bench
 }

@@ -11,9 +11,10 @@ use crate::fpga::{Even, Golden};
 use nirspi::link::Link;
 use nirspi::session::{IgnorePackets, Session, request};
 use nirspi::setup::MeasurementSetup;
+use nirspi_mcu::Limits;
 use nirspi_optics::Scene;
 use nirspi_recon::Order;
-use nirspi_virtual::{MemoryLink, VirtualOptics};
+use nirspi_virtual::{MemoryLink, StuckEnable, VirtualOptics};
 use nirspi_wire::RunLength;
 
 const SEED: u64 = 7;
@@ -54,8 +55,22 @@ fn connected_as(plan: Plan) -> Option<Camera> {
     Some(camera)
 }
 
+/// The same camera as a simulation of its firmware alone. Its first light waits for the test of the LED enables, which
+/// takes samples of the same noise.
 fn virtual_camera() -> Box<dyn Link> {
-    Box::new(MemoryLink::new(optics().camera(SEED).unwrap()))
+    let camera = optics().camera(SEED).unwrap();
+    Box::new(MemoryLink::new(camera.with_limits(Limits::REFERENCE)))
+}
+
+/// A camera with an LED enable that is high whatever its chip says.
+fn connected_with(stuck: Option<StuckEnable>) -> Option<Camera> {
+    connected_as(Plan::new(move || {
+        let fpga = optics().fpga(SEED).unwrap();
+        Box::new(Golden::new(match stuck {
+            Some(stuck) => fpga.stuck(stuck),
+            None => fpga,
+        }))
+    }))
 }
 
 /// The natural order, with the latency of the simulated receiver. A frame of 24 sweeps takes 2 ms, longer than the

@@ -167,7 +167,7 @@ fn optics() -> VirtualOptics {
 }
 
 fn camera(script: Script) -> Camera {
-    let limits = Limits { host_silence: SILENCE, ..Limits::default() };
+    let limits = Limits { host_silence: SILENCE, ..Limits::SIMULATED };
     let depth = optics().depth(1).unwrap();
     VirtualCamera::new(Scripted::new(script), depth, "faults").with_limits(limits)
 }

@@ -198,7 +198,7 @@ fn stream(
 ) -> Cost {
     let mut bus = PortBus::new(memory, room.frame);
     let mut camera =
-        Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::default());
+        Camera::new(BoardInfo::new("counted", "", Version(0, 0, 0)), Limits::SIMULATED);
     let mut now = Micros(0);
     for command in [
         Command::Hello { protocol: version::CURRENT },

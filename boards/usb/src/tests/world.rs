@@ -138,7 +138,7 @@ impl World {
             frame: Box::leak(Box::new([0; MAX_FRAME_BYTES])),
             loader: NoLoader,
             info,
-            limits: Limits::default(),
+            limits: Limits::SIMULATED,
             crash,
             restarts: 0,
         };

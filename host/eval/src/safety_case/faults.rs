@@ -215,9 +215,9 @@ pub const FAULTS: &[SingleFault] = &[
     fault(
         "the FPGA's LED enable is stuck high",
         Lit::All,
-        "nothing within a session: lines at rest light every LED from a configuration on, until the session ends or a fault \
-         comes, with which the firmware's enable falls (and the array's one-shot ends it after 10 ms). `nirspi camera selftest` \
-         finds it, and forbids light",
+        "before the first light after power-up the firmware's own test, within milliseconds; then nothing within a session: \
+         lines at rest light every LED until the session ends or a fault comes, with which the firmware's enable falls (and \
+         the array's one-shot ends it after 10 ms). `nirspi camera selftest` finds it, and forbids light",
         DarkAfter::Never,
         &[],
     ),
@@ -258,13 +258,14 @@ pub const FAULTS: &[SingleFault] = &[
     fault(
         "the microcontroller's LED enable is stuck high",
         Lit::Brightest,
-        "the FPGA's enable falls with every end of a run, at the latest when the host falls silent; `nirspi camera selftest` finds \
-         it, and forbids light",
+        "the FPGA's enable falls with every end of a run, at the latest when the host falls silent; the test before the first \
+         light and `nirspi camera selftest` find it, and forbid light",
         HOST_SILENCE,
         &[
             "a_silent_host",
             "each_fault_that_the_fpga_latches",
             "a_stuck_enable_is_a_fault_that_no_configuration_acknowledges",
+            "a_stuck_enable_refuses_the_first_light",
         ],
     ),
     fault(

@@ -48,7 +48,7 @@ impl Graph {
             depth: 0,
         };
         let mut seen = HashMap::new();
-        let start = World::new();
+        let start = World::new(walk.tries_enables);
         seen.insert(start.key(), 0);
         graph.notes.push(start.note());
         graph.parents.push((NONE, 0));
@@ -174,6 +174,8 @@ struct Walk {
     troubles: u32,
     /// How many commands may wait for their replies at a time.
     window: usize,
+    /// The first light waits for the test of the LED enables.
+    tries_enables: bool,
 }
 
 /// The actions of every walk, more, and the beginning and end of these troubles.
@@ -187,7 +189,7 @@ fn with(more: &[Action], troubles: &[Trouble]) -> Vec<Action> {
 }
 
 fn walk(name: &'static str, actions: Vec<Action>, troubles: u32, window: usize) -> Walk {
-    Walk { name, actions, troubles, window }
+    Walk { name, actions, troubles, window, tries_enables: false }
 }
 
 fn walks() -> Vec<Walk> {
@@ -215,6 +217,15 @@ fn walks() -> Vec<Walk> {
             1,
             1,
         ),
+        Walk {
+            tries_enables: true,
+            ..walk(
+                "the first light tries the LED enables",
+                with(&[Burst, SelfTest, Reset, FirstPiece, LastPiece], &[BusDeaf, Interlock]),
+                1,
+                1,
+            )
+        },
     ]
 }
 

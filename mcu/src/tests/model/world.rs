@@ -127,11 +127,15 @@ fn age(now: Micros) -> impl Fn(Micros) -> u64 + Copy {
 
 impl World {
     /// Power-up, and the first poll.
-    pub fn new() -> Self {
+    ///
+    /// If the first light waits for the test of the LED enables, that takes three ticks, in which the host is silent.
+    pub fn new(tries_enables: bool) -> Self {
+        let silence = if tries_enables { 4 } else { 2 };
         let limits = Limits {
-            host_silence: Micros(2 * TICK),
+            host_silence: Micros(silence * TICK),
             stall_min: Micros(TICK + TICK / 2),
-            ..Limits::default()
+            tries_enables,
+            ..Limits::REFERENCE
         };
         let mut bench = Bench::new();
         bench.camera = Camera::new(bench.camera.machine().info.clone(), limits);
@@ -383,6 +387,11 @@ impl World {
             Err("light without a session".into())
         } else if silence > machine.limits.host_silence {
             Err(format!("light after {} us without a command", silence.0))
+        } else if machine.limits.tries_enables
+            && !machine.enables_sound
+            && !matches!(machine.activity, Activity::TestFrame(_) | Activity::Enables(_))
+        {
+            Err("light before each enable has kept the array dark".into())
         } else {
             Ok(())
         }
@@ -518,7 +527,7 @@ impl World {
         let due = machine.last_check.is_none_or(|last| last != *now);
         (machine.setup.is_some(), machine.reboot.is_some(), machine.crash.is_some(), due)
             .hash(hash);
-        (machine.off_pending, machine.release_pending).hash(hash);
+        (machine.off_pending, machine.release_pending, machine.enables_sound).hash(hash);
         match machine.port {
             Port::Unknown(due) => (1, due > *now).hash(hash),
             Port::Sound => 2.hash(hash),

@@ -6,7 +6,6 @@ use crate::chip::OnTheBus;
 use crate::chip::{Ready, map};
 use crate::fpga::Fpga;
 use crate::machine::Stop;
-use nirspi_virtual::StuckEnable;
 use nirspi_wire::host_port::{QUAD, READ_PACKET};
 use nirspi_wire::register::DAMAGED;
 use nirspi_wire::{Fault, RebootInto, SelfTestReport, State};
@@ -179,17 +178,32 @@ fn a_stuck_led_enable_is_found_by_the_self_test() {
         (Some(StuckEnable::Board), SelfTestReport::BOARD_ENABLE),
         (Some(StuckEnable::Fpga), SelfTestReport::FPGA_ENABLE),
     ] {
-        let plan = Plan::new(move || {
-            let fpga = optics().fpga(SEED).unwrap();
-            Box::new(Golden::new(match stuck {
-                Some(stuck) => fpga.stuck(stuck),
-                None => fpga,
-            }))
-        });
-        let Some(camera) = connected_as(plan) else { return };
+        let Some(camera) = connected_with(stuck) else { return };
         let mut session = Session::open(camera.link()).unwrap();
         let report = session.self_test(&mut IgnorePackets).unwrap();
         assert_eq!(report.failed, failed, "{stuck:?}");
+        assert!(!is_lit(&camera));
+        camera.assert_no_violation();
+    }
+}
+
+/// Before the first run, and with the board's own pin low until then.
+#[test]
+fn a_stuck_led_enable_refuses_the_first_run() {
+    for (stuck, fault) in
+        [(StuckEnable::Board, Fault::BoardEnableStuck), (StuckEnable::Fpga, Fault::FpgaEnableStuck)]
+    {
+        let Some(camera) = connected_with(Some(stuck)) else { return };
+        let mut session = Session::open(camera.link()).unwrap();
+        natural()
+            .with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))
+            .unwrap();
+        assert!(!is_lit(&camera), "a configuration alone lights nothing");
+        let start = request::Start(RunLength::Continuous);
+        let refused = session.command(start, &mut IgnorePackets).unwrap_err();
+        assert!(refused.to_string().contains(&fault.to_string()), "{refused}");
+        let status = session.status(&mut IgnorePackets).unwrap();
+        assert_eq!((status.state, status.fault, status.run), (State::Fault, Some(fault), 0));
         assert!(!is_lit(&camera));
         camera.assert_no_violation();
     }

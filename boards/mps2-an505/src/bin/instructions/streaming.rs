@@ -180,7 +180,7 @@ pub fn count<const N: usize>(runs: [(u32, u32); N]) -> [Cost; N] {
         frame: FRAME.take(),
         loader: NoLoader,
         info: BoardInfo::new("counted", "", Version(0, 0, 0)),
-        limits: Limits::default(),
+        limits: Limits::SIMULATED,
         crash: None,
         restarts: 0,
     };
