@@ -18,6 +18,10 @@ const LEFT: f64 = 1e-6;
 const SETTLED_PX: f64 = 0.02;
 /// The most that a turn changes the motion, in pixels a frame.
 const MOST_PX: f64 = 0.3;
+/// Squares are more than noise where their mean exceeds its expectation by so many standard deviations,
+const SURE: f64 = 3.5;
+/// and by this share, which the noise itself is not known to.
+const NOISE_KNOWN_TO: f64 = 0.03;
 /// Power of a scene's frequency `f`, in cycles a pixel, for a scene of variance 1: this over `(CANVAS f)^2`. The
 /// sum over all frequencies of a canvas of 64 x 64 pixels is its variance.
 const POWER: f64 = 170.0;
@@ -49,6 +53,8 @@ pub(crate) struct Fitted {
     pub velocity_px: [f64; 2],
     /// Mean square of what it leaves of a reading.
     pub left: f64,
+    /// What it leaves of the newest groups' readings, [beyond noise](beyond_noise).
+    pub beyond_newest: f64,
 }
 
 /// The scene for a motion, its smear, and the groups' ways.
@@ -95,13 +101,11 @@ impl<'a> Fit<'a> {
         }
         self.solve(&scene, LAST_STEPS, &mut spectrum);
         let readings = (self.groups.len() * self.canvas.readings()) as f64;
-        let left = self
-            .left(&scene, &spectrum)
-            .iter()
-            .flatten()
-            .map(|v| f64::from(*v).powi(2))
-            .sum::<f64>();
-        Fitted { spectrum, velocity_px: scene.velocity_px, left: left / readings }
+        let of_groups = self.left(&scene, &spectrum);
+        let left = of_groups.iter().flatten().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+        let newest = of_groups.iter().rev().map(|left| left.iter().copied().map(f64::from));
+        let beyond_newest = beyond_noise(newest.take(of_groups.len() / 2), self.known.noise);
+        Fitted { spectrum, velocity_px: scene.velocity_px, left: left / readings, beyond_newest }
     }
 
     fn scene(&self, velocity_px: [f64; 2]) -> Scene {
@@ -199,6 +203,40 @@ impl<'a> Fit<'a> {
         }
         Some([(d * side[0] - b * side[1]) / determinant, (a * side[1] - c * side[0]) / determinant])
     }
+}
+
+/// What is left of the newest frames beyond noise, as the square of a reading: of the mean of the newest one, two, four and so
+/// on, the most. The newest frame comes first. Not more than noise lets see counts as nothing.
+///
+/// The mean over all frames does not show a target that has just changed its way: most of them were before that.
+pub(crate) fn beyond_noise<I>(left: impl Iterator<Item = I>, noise: f64) -> f64
+where
+    I: Iterator<Item = f64>,
+{
+    let mut sum: Vec<f64> = Vec::new();
+    let mut most = 0.0_f64;
+    for (count, left) in (1_u32..).zip(left) {
+        if count == 1 {
+            sum = left.collect();
+        } else {
+            sum.iter_mut().zip(left).for_each(|(sum, left)| *sum += left);
+        }
+        if !count.is_power_of_two() || sum.is_empty() {
+            continue;
+        }
+        let readings = sum.len() as f64;
+        let (count, expected) = (f64::from(count), noise / f64::from(count));
+        let square = sum.iter().map(|sum| (sum / count).powi(2)).sum::<f64>() / readings;
+        if square > most_by_noise(expected, readings) {
+            most = most.max(square - expected);
+        }
+    }
+    most
+}
+
+/// The most that a mean of so many squares is by noise alone, where `expected` is its expectation.
+pub(crate) fn most_by_noise(expected: f64, readings: f64) -> f64 {
+    expected * (1.0 + SURE * (2.0 / readings).sqrt() + NOISE_KNOWN_TO)
 }
 
 impl Scene {

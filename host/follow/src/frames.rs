@@ -1,23 +1,18 @@
 //! Frames of the same patterns: their noise, their means, and what one motion makes of them.
 
 use crate::canvas::Canvas;
-use crate::fit::{Fit, Fitted, Group, Known};
+use crate::fit::{Fit, Fitted, Group, Known, beyond_noise, most_by_noise};
 use crate::search::Shapes;
 use crate::{FollowError, FollowSettings, Followed, Timed};
 use nirspi_recon::Measurements;
 
 /// The fewest frames whose motion is looked for.
-const FEWEST: usize = 4;
+pub(crate) const FEWEST: usize = 4;
 /// Frames of a slow target are added by twos, threes and so on first, as long as it moves by no more than this
 /// meanwhile, in pixels.
 const GROUP_PX: f64 = 0.5;
 /// The fewest groups of a fit.
 const GROUPS: usize = 8;
-/// Means of two halves of the frames differ by more than noise where the square of their difference exceeds its expectation by so
-/// many standard deviations,
-const SURE: f64 = 3.5;
-/// and by this share, which the noise itself is not known to.
-const NOISE_KNOWN_TO: f64 = 0.03;
 /// The noise is read from the row that is louder than one in this number of all rows: louder rows may show the motion.
 const QUIET: usize = 5;
 /// Normal deviate that one of [`QUIET`] is below.
@@ -28,7 +23,8 @@ const ALIKE: f64 = 1.0 + 2.0 * (16.0 / 36.0 + 1.0 / 36.0);
 /// A fit that leaves no more than this beyond noise needs no other guess of the motion, in variances of the noise.
 const SMALL: f64 = 0.1;
 
-/// Part of what a fit leaves beyond noise that counts as an error of the scene.
+/// Part of what a fit leaves of all frames beyond noise that counts as an error of the scene as it stands now. What it leaves of
+/// the newest frames counts whole.
 const OF_BEYOND: f64 = 0.3;
 /// The most that a fit leaves beyond noise, in variances of a frame's noise.
 const MOST_BEYOND: f64 = 0.3;
@@ -116,7 +112,7 @@ impl<'a> Frames<'a> {
         let expected = noise * (1.0 / half as f64 + 1.0 / (self.0.len() - half) as f64);
         let squares = older.iter().zip(&newer).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         let readings = older.len() as f64;
-        squares / readings <= expected * (1.0 + SURE * (2.0 / readings).sqrt() + NOISE_KNOWN_TO)
+        squares / readings <= most_by_noise(expected, readings)
     }
 
     fn mean_of(&self, of: std::ops::Range<usize>) -> Vec<f64> {
@@ -133,12 +129,12 @@ impl<'a> Frames<'a> {
     /// The mean of the newest frames. Their noise is unknown, or known.
     pub fn at_rest(&self, count: usize, noise: Option<f64>) -> Sum {
         let values = self.mean_of(self.0.len() - count..self.0.len());
-        Sum {
-            values,
-            frames: count,
-            velocity_px: [0.0; 2],
-            error: noise.map(|noise| noise / count as f64),
-        }
+        let error = noise.map(|noise| {
+            let newest = (self.0.len() - count / 2..self.0.len()).rev();
+            let left = newest.map(|index| self.values(index).zip(&values).map(|(a, b)| a - b));
+            noise / count as f64 + beyond_noise(left, noise)
+        });
+        Sum { values, frames: count, velocity_px: [0.0; 2], error }
     }
 
     /// The sum as a measurement.
@@ -182,7 +178,7 @@ impl<'a> Frames<'a> {
             if !self.reaches(fitted.velocity_px, settings.reach_px) {
                 continue;
             }
-            let beyond = (fitted.left - of_group).max(0.0);
+            let beyond = (fitted.left - of_group).max(0.0).max(fitted.beyond_newest);
             let enough = beyond < SMALL * of_group;
             if best.as_ref().is_none_or(|best| beyond < best.1) {
                 best = Some((fitted, beyond));
@@ -194,7 +190,8 @@ impl<'a> Frames<'a> {
         let (fitted, beyond) = best.filter(|(_, beyond)| *beyond <= MOST_BEYOND * noise)?;
         let way = canvas.way(fitted.velocity_px, newest.at - self.middle());
         let seen = canvas.frame(&fitted.spectrum, &way);
-        let error = noise * self.share_of_noise(fitted.velocity_px) + OF_BEYOND * beyond;
+        let beyond = (OF_BEYOND * beyond).max(fitted.beyond_newest);
+        let error = noise * self.share_of_noise(fitted.velocity_px) + beyond;
         Some(Sum {
             values: seen.into_iter().map(f64::from).collect(),
             frames: self.0.len(),

@@ -31,7 +31,7 @@ mod fit;
 mod frames;
 mod search;
 
-use frames::Frames;
+use frames::{FEWEST, Frames};
 use nirspi_recon::{MeasurementError, Measurements};
 use thiserror::Error;
 
@@ -98,7 +98,7 @@ pub enum FollowError {
 
 /// Adds as many of the newest frames as the motion that is seen in them allows. The frames stand in the order of their times.
 /// Among all frames, half of them, a quarter and so on, those count whose result has the least error: noise, and what one
-/// motion of the whole scene leaves of the readings beyond noise. Fewer than four frames without a known noise are
+/// motion of the whole scene leaves of the readings beyond noise, of all frames and of the newest ones. Fewer than four frames without a known noise are
 /// taken to be at rest.
 ///
 /// # Errors
@@ -125,7 +125,10 @@ pub fn follow(frames: &[Timed<'_>], settings: &FollowSettings) -> Result<Followe
         if let Some(found) = found.filter(|found| found.error < best.error) {
             best = found;
         }
-        count /= 2;
+        count = match count / 2 {
+            half if half < FEWEST && count > FEWEST => FEWEST,
+            half => half,
+        };
     }
     frames.followed(best)
 }

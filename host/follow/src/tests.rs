@@ -133,6 +133,27 @@ fn after_another_motion_only_the_newest_frames_are_added() {
     assert!((found.velocity_px[1] - 0.5).abs() < 0.01, "{:?}", found.velocity_px);
 }
 
+/// A target that begins to move, turns, and stops: frames of before must not be taken for what is there now. The newest frame
+/// alone would have an error of [`NOISE`].
+#[test]
+fn a_target_that_changes_its_way_is_never_worse_than_its_newest_frame() {
+    let path = |k: usize| -> [f64; 2] {
+        let since = |turn: f64| (k as f64 - turn).clamp(0.0, 24.0);
+        [0.3 * since(52.0), 0.5 * since(28.0) - 0.5 * since(52.0)]
+    };
+    let places: Vec<[f64; 2]> = (0..92).map(path).collect();
+    let frames = frames(&places, &rows(1.0), 8);
+    let timed = timed(&frames);
+    let mut before = None;
+    for now in (24..timed.len()).step_by(2) {
+        let settings = FollowSettings { before, ..FollowSettings::default() };
+        let found = follow(&timed[now.saturating_sub(27)..=now], &settings).unwrap();
+        before = Some(found.velocity_px);
+        let error = error(&found.measurements, &scene(places[now][0], places[now][1]));
+        assert!(error < 0.7 * NOISE, "frame {now}, {} added: {error}", found.frames);
+    }
+}
+
 #[test]
 fn a_scene_that_jumps_gives_the_newest_frame_alone() {
     let places: Vec<[f64; 2]> =
