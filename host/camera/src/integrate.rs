@@ -29,6 +29,10 @@ pub struct Integrated {
     known: KnownOfRun,
 }
 
+/// Number of frames that are kept alone, for a scene that moves: at 24 pictures a second and frames of 1.5 ms, those of one
+/// picture.
+pub(crate) const NEWEST: usize = 28;
+
 /// What the frames of a run tell together, and one of them alone does not.
 #[derive(Debug, Clone, Default)]
 pub struct KnownOfRun {
@@ -271,14 +275,15 @@ fn with_noise(
     }
 }
 
-/// The sum of the newest frames of a run, for a live view. Each new frame is added and the oldest
-/// is subtracted.
+/// The newest frames of a run, for a live view. Each new frame is added to their total and the oldest is subtracted. A copy
+/// shares the frames.
 #[derive(Debug, Clone)]
 pub struct Newest {
-    frames: VecDeque<Integrated>,
+    /// Each frame alone, with its number in the run.
+    frames: VecDeque<(u64, Arc<Integrated>)>,
     total: Integrated,
     /// The frame before the oldest: one frame alone does not tell its noise.
-    before: Option<Integrated>,
+    before: Option<Arc<Integrated>>,
     /// Frames of sweeps that alternate are kept in whole cycles.
     alternating: bool,
 }
@@ -298,7 +303,7 @@ impl Newest {
         let cycle = CYCLE as usize;
         let most = if self.alternating && most > cycle { most - most % cycle } else { most };
         while self.frames.len() >= most.max(1) {
-            let Some(oldest) = self.frames.pop_front() else { break };
+            let Some((_, oldest)) = self.frames.pop_front() else { break };
             for (total, sum) in self.total.sums.iter_mut().zip(&oldest.sums) {
                 *total -= sum;
             }
@@ -310,20 +315,37 @@ impl Newest {
         alone.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
         alone.flags = frame.flags;
         self.total.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
-        self.frames.push_back(alone);
+        self.frames.push_back((frame.sequence.into(), Arc::new(alone)));
     }
 
-    /// The sum of the frames. Its noise is known from two frames of the run on, also where it is a sum of
-    /// one.
+    /// Number of frames.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames.len() as u64
+    }
+
+    /// The sum of the frames. Its noise is known from two frames of the run on, also where it is a sum of one, and so is
+    /// whether the scene [changed](Integrated::changed) in these frames.
     #[must_use]
     pub fn sum(&self) -> Integrated {
+        let frames = || self.frames.iter().map(|(_, frame)| frame);
         // Flags cannot be subtracted, so they are collected anew.
-        let flags = self.frames.iter().fold(FrameFlags::default(), |all, f| all.with(f.flags));
-        let mut spread = Spread::default();
-        for frame in self.before.iter().chain(&self.frames) {
+        let flags = frames().fold(FrameFlags::default(), |all, frame| all.with(frame.flags));
+        let (mut spread, mut changes) = (Spread::default(), Changes::default());
+        for frame in self.before.iter().chain(frames()) {
             spread.add(frame.sums.iter().copied(), frame.sweeps);
         }
-        Integrated { flags, spread, ..self.total.clone() }
+        for frame in frames() {
+            let sweeps = u32::try_from(frame.sweeps).unwrap_or(u32::MAX);
+            changes.add(frame.sums.iter().copied(), sweeps);
+        }
+        let noise_of_a_sweep = spread.of_a_sweep();
+        let changed = noise_of_a_sweep.and_then(|noise| changes.share(noise));
+        let alone = self.frames.len().saturating_sub(NEWEST);
+        let newest = changed.map(|_| self.frames.iter().skip(alone).cloned().collect());
+        let newest = newest.unwrap_or_default();
+        let known = KnownOfRun { noise_of_a_sweep, offsets: None, changed, newest };
+        Integrated { flags, spread, known, ..self.total.clone() }
     }
 }
 
@@ -373,6 +395,28 @@ mod tests {
         // A live view of one frame looks at the frame before.
         let shown = newest.sum().noise(&setup).unwrap();
         assert!((0.5..2.0).contains(&(shown / of_one)), "{shown} {of_one}");
+    }
+
+    #[test]
+    fn the_newest_frames_of_a_scene_that_moves_are_kept_alone() {
+        let setup = MeasurementSetup::new(&Order::Natural, 64.0 / 1024.0).unwrap();
+        for moves in [false, true] {
+            let mut newest = Newest::new(&setup);
+            for k in 0..40_i64 {
+                let reading = |pattern: i64| {
+                    let noise = (k * 7919 + pattern * 104_729) % 13 - 6;
+                    9_000 / (1 + pattern + if moves { k } else { 0 }) + noise
+                };
+                let values: Vec<i64> = (0..64).map(reading).collect();
+                with_frame(&values, FrameFlags::default(), |frame| newest.push(frame, 32));
+            }
+            let sum = newest.sum();
+            assert_eq!((newest.frames(), sum.frames()), (32, 32));
+            assert_eq!(sum.changed().is_some(), moves, "{:?}", sum.changed());
+            let alone: Vec<u64> = sum.newest().map(|(_, frame)| frame.frames()).collect();
+            assert_eq!(alone, vec![1; if moves { NEWEST } else { 0 }]);
+            assert!(sum.newest().all(|(_, frame)| frame.noise(&setup).is_some()));
+        }
     }
 
     proptest! {

@@ -4,16 +4,12 @@
 //! A recording gives the same tally as the capture that made it.
 
 use crate::account::{Arrival, Check, LossAccount};
-use crate::integrate::{Changes, Integrated, KnownOfRun, Phases};
+use crate::integrate::{Changes, Integrated, KnownOfRun, NEWEST, Phases};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use thiserror::Error;
-
-/// Number of frames that are kept alone, for a scene that moves: at 24 pictures a second and frames of 1.5 ms, those of one
-/// picture.
-const NEWEST: usize = 28;
 
 /// The sum and the account of a run's packets.
 #[derive(Debug, Clone)]
