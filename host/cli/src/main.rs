@@ -20,6 +20,7 @@ mod enhance;
 mod eval;
 mod example;
 mod export;
+mod feed;
 mod first_page;
 mod flash;
 mod gateware;

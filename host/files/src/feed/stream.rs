@@ -227,7 +227,12 @@ impl Feed {
             if self.end.is_some() {
                 return false;
             }
+            // Bytes that give no frame must not keep the caller for ever.
             let wait = until.saturating_duration_since(Instant::now());
+            if wait.is_zero() && !self.block.is_empty() {
+                self.block.clear();
+                return false;
+            }
             let end = match self.bytes.next(wait) {
                 None => return false,
                 Some(Ok(block)) if !block.is_empty() => {
