@@ -5,12 +5,11 @@ use super::report::ReportArgs;
 use super::{Usage, print, provenance, settings};
 use anyhow::{Result, bail};
 use nirspi::capture::{FeedProgress, FeedReport, Seconds, StopCause, record_feed};
-use nirspi::files::feed::{Address, Feed, FeedError, Header, Recorder};
+use nirspi::files::feed::{Address, Feed, FeedError, Recorder};
 use nirspi::files::interrupt;
 use nirspi::files::output::Existing;
-use nirspi::provenance::{Origin, Provenance, Taken};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
@@ -37,7 +36,7 @@ pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
             return Err(Usage(format!("--out {out}: expected a name that ends in .npz")).into());
         }
         Some(out) => out.to_owned(),
-        None => first_free(),
+        None => Recorder::first_free(Path::new("")),
     };
     Existing::of(overwrite, None).check(&out)?;
     let stop = interrupt::stop_flag();
@@ -49,7 +48,7 @@ pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
         Err(FeedError::Stopped(_)) => bail!("{address}: stopped before the header came"),
         opened => opened?,
     };
-    let provenance = of_feed(address, feed.header());
+    let provenance = feed.header().taken(address).made(provenance::made());
     let recorder = Recorder::begin(&out, overwrite, feed.header(), &provenance)?;
     let watch = |progress: &FeedProgress<'_>| {
         bar.set(progress.account.frames);
@@ -74,6 +73,11 @@ pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
     }
 }
 
+/// Whether the user has given this option on the command line.
+pub fn is_given(name: &str) -> bool {
+    settings::given().iter().any(|given| given == name)
+}
+
 /// Refuses options for cameras, all but these.
 pub fn refuse_others(known: &[&str]) -> Result<()> {
     let mut given = settings::given().iter().map(String::as_str);
@@ -84,23 +88,6 @@ pub fn refuse_others(known: &[&str]) -> Result<()> {
             Err(Usage(format!("--{other} does not go with --camera feed:ADDR: {why}")).into())
         }
     }
-}
-
-/// Where readings of a feed come from.
-pub fn of_feed(address: &Address, header: &Header) -> Provenance {
-    let origin = match header.simulated {
-        Some(true) => Origin::Simulated,
-        Some(false) => Origin::Measured,
-        None => Origin::Unknown,
-    };
-    let name = header.name.clone().unwrap_or_else(|| address.to_string());
-    Taken { origin, camera: None, file: Some(name) }.made(provenance::made())
-}
-
-/// The first name that no file has.
-fn first_free() -> PathBuf {
-    let names = (1..).map(|number| PathBuf::from(format!("capture-{number}.npz")));
-    names.into_iter().find(|name| !name.exists()).unwrap_or_default()
 }
 
 fn say(address: &Address, report: &FeedReport) -> Result<()> {

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// The header of a scene's pairs, with `more` of it.
-fn header(scene: &Measured, more: &str) -> String {
+pub fn header(scene: &Measured, more: &str) -> String {
     let rows: Vec<String> = scene.h_row.iter().map(ToString::to_string).collect();
     let (n, rows) = (scene.n, rows.join(","));
     format!("{{\"n\":{n},\"h_row\":[{rows}],\"readings\":\"pairs\",\"unit\":\"V\"{more}}}\n")
@@ -35,13 +35,13 @@ fn as_f32(readings: &[f32]) -> Vec<u8> {
     readings.iter().flat_map(|reading| reading.to_le_bytes()).collect()
 }
 
-fn as_text(readings: &[f32]) -> String {
+pub fn as_text(readings: &[f32]) -> String {
     // The file has these numbers to the bit.
     readings.iter().map(|&reading| format!("{}\n", f64::from(reading))).collect()
 }
 
 /// The image of the scene's own measurement file.
-fn image_of_file(bench: &Bench, scene: &Measured) -> Vec<f32> {
+pub fn image_of_file(bench: &Bench, scene: &Measured) -> Vec<f32> {
     bench.write("file.npz", &scene.npz());
     bench.run(&["reconstruct", "file.npz", "--method", "hadamard", "--out", "file"]).succeeded();
     bench.pixels("file/image.npy")

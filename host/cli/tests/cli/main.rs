@@ -48,6 +48,7 @@ mod selftest;
 mod serial;
 mod serve;
 mod serve_controls;
+mod serve_feed;
 mod serve_guarded;
 mod serve_proxied;
 mod settings;

@@ -1,9 +1,11 @@
 //! The first line of a feed: one JSON object.
 
+use super::address::Address;
 use crate::error::Shown;
+use crate::provenance::{Origin, Taken};
 use crate::trace::Raw;
 use nirspi_recon::law::Form;
-use nirspi_recon::{Order, Rows, Side};
+use nirspi_recon::{Order, Side};
 use serde::Deserialize;
 use std::str::FromStr;
 use thiserror::Error;
@@ -211,10 +213,16 @@ impl Header {
             .map_or_else(|| "h_row".to_owned(), |order| order.to_string())
     }
 
-    /// The rows, if each is shown once.
+    /// Where readings of a feed with this header come from.
     #[must_use]
-    pub fn each_once(&self) -> Option<Rows> {
-        Rows::new(self.side, self.rows.iter().copied()).ok()
+    pub fn taken(&self, address: &Address) -> Taken {
+        let origin = match self.simulated {
+            Some(true) => Origin::Simulated,
+            Some(false) => Origin::Measured,
+            None => Origin::Unknown,
+        };
+        let name = self.name.clone().unwrap_or_else(|| address.to_string());
+        Taken { origin, camera: None, file: Some(name) }
     }
 
     /// The type of a recorded reading, as NumPy writes it. A mean of samples is no integer.

@@ -56,6 +56,13 @@ struct About {
 }
 
 impl Recorder {
+    /// The first of `capture-1.npz`, `capture-2.npz`, ... that a folder has not.
+    #[must_use]
+    pub fn first_free(folder: &Path) -> PathBuf {
+        let mut names = (1_u32..).map(|number| folder.join(format!("capture-{number}.npz")));
+        names.find(|name| !name.exists()).unwrap_or_default()
+    }
+
     /// Begins a recording. The first file is `path`; the next are `NAME-2.npz`, `NAME-3.npz` and so on. A name that is
     /// taken is refused unless `overwrite` is set.
     ///
