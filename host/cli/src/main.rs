@@ -30,6 +30,7 @@ mod inspect;
 mod method;
 mod metrics;
 mod networks;
+mod order;
 mod packaging;
 mod pairs;
 mod print;
@@ -98,6 +99,7 @@ commands! { Command, run:
     Reconstruct(reconstruct::Args) => reconstruct::run,
     Inspect(inspect::Args) => inspect::run,
     Readings(readings::Args) => readings::run,
+    Order(order::Args) => order::run,
     Enhance(enhance::Args) => enhance::run,
     Deblur(deblur::Args) => deblur::run,
     Metrics(metrics::Args) => metrics::run,

@@ -182,3 +182,55 @@ fn a_capture_of_a_feed_ends_at_ctrl_c_and_keeps_its_frames() {
     }
     assert!(!bench.names().iter().any(|name| name.starts_with('.')), "{:?}", bench.names());
 }
+
+#[test]
+fn patterns_for_a_dmd_are_those_of_the_order_and_begin_a_feed() {
+    let bench = Bench::new();
+    let order = ["order", "zig-zag", "--n", "8", "--scale", "2", "--out", "patterns"];
+    let said = bench.run(&order).succeeded().stdout;
+    assert!(said.contains("wrote 128 patterns and complements (pictures)"), "{said}");
+    assert!(bench.path("patterns/00127.png").exists());
+    // Readings under the all-on pattern and its complement, and under all others.
+    let header = std::fs::read_to_string(bench.path("patterns/header.json")).unwrap();
+    let readings = "9 1\n".to_owned() + &"5 5\n".repeat(63);
+    bench.write("log.txt", (header + &readings).as_bytes());
+    let capture = ["capture", "--camera", "feed:log.txt", "--frames", "1", "--out", "rec.npz"];
+    bench.run(&capture).succeeded();
+    let image = images(&bench, "rec.npz");
+    assert!(image.iter().all(|&pixel| (pixel - 8.0 / 64.0).abs() < 1e-6), "{image:?}");
+    // The table says the same as the name of the order.
+    bench.write("y.txt", readings.as_bytes());
+    for shown in ["zig-zag", "table:patterns/order.txt"] {
+        let arguments = ["reconstruct", "y.txt", "--readings", "pairs", "--shown", shown, "--out"];
+        bench.run(&[&arguments[..], &[&shown[..5]]].concat()).succeeded();
+    }
+    assert_eq!(bench.pixels("zig-z/image.npy"), bench.pixels("table/image.npy"));
+    bench.run(&["order", "natural", "--n", "9"]).failed(2, &["--n: an image side of 9 pixels"]);
+    bench
+        .run(&["order", "natural", "--patterns", "0"])
+        .failed(2, &["0 patterns, expected 1 to 1024 for n = 32"]);
+}
+
+/// The Python of docs/feeds.md, with a simulated DAQ, in front of the command of the page.
+#[cfg(unix)]
+#[test]
+fn five_lines_of_python_make_a_dmd_with_a_daq_a_feed() {
+    let bench = Bench::new();
+    let page = include_str!("../../../../docs/feeds.md");
+    let code = page.split("```python\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let commands = page.matches("python bench.py | nirspi ").count();
+    assert!(code.lines().filter(|line| !line.is_empty()).count() <= 5 && commands == 2, "{code}");
+    // A scene of one bright pixel: all patterns of a row light it with +1.
+    let daq = "pairs = [v for _ in range(64 * 64) for v in (2.5, 0.5)]\n\
+               daq = [(pairs * 3)[at:at + 1000] for at in range(0, 3 * len(pairs), 1000)]\n";
+    bench.write("bench.py", format!("{daq}{code}").as_bytes());
+    let python = std::env::var("NIRSPI_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let pipe = format!("{python} bench.py > in.txt; exec < in.txt");
+    let arguments =
+        ["capture", "--camera", "feed:-", "--frames", "3", "--out", "rec.npz", "--json"];
+    let report = bench.start_limited(&pipe, &arguments).wait().succeeded().json();
+    assert_eq!((&report["name"], &report["account"]["frames"]), (&"DMD".into(), &3.into()));
+    let image = images(&bench, "rec.npz");
+    assert_eq!(image.len(), 3 * 64 * 64);
+    assert!((image[0] - 2.0).abs() < 1e-3 && image[1].abs() < 1e-3, "{:?}", &image[..2]);
+}

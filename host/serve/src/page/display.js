@@ -122,7 +122,7 @@ export function show(message) {
     // A feed has its own side and unit.
     const own = { side: picture?.n ?? 32, unit: foreign(picture?.unit ?? ""), isAny: picture?.unit !== "ADC counts" };
     for (const id of ["readings", "image"]) Object.assign(PANELS[id], own);
-    text($("image-size"), `${PANELS.image.side} × ${PANELS.image.side}`);
+    $("about-image").previousSibling.textContent = `reconstructed, ${own.side} × ${own.side} `;
     for (const panel of Object.values(PANELS)) panel.values = values(message[panel.of]);
     redraw();
   }
