@@ -1,6 +1,6 @@
 use super::camera_log::Phase;
 use super::light::Leds;
-use super::look::RunSetup;
+use super::look::{RunSetup, Seen};
 use super::settings::Measuring;
 use super::settings::tests::{offer, settings};
 use super::state::Published;
