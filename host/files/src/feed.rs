@@ -15,7 +15,7 @@
 //! (`frames::tests::every_number_has_its_place_however_the_bytes_are_cut`). A number that is no number takes the place of a
 //! reading that was not read, so that the readings after it keep their patterns
 //! (`frames::tests::a_word_takes_the_place_of_one_reading`). A feed can send anything, and takes memory for one header, one frame
-//! and [a few blocks](stream::BLOCKS) at most (`stream::tests::a_header_without_end_is_refused_before_it_fills_the_memory`).
+//! and a few blocks at most (`stream::tests::a_header_without_end_is_refused_before_it_fills_the_memory`).
 
 mod account;
 mod address;
