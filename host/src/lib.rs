@@ -13,6 +13,7 @@
 //! * [`picture`] draws, [`scene`] is what a camera looks at,
 //! * [`source`] reads measurements from a file, a recording or a capture, `nirspi-recon` reconstructs
 //!   images, [`imaging`] scales, enhances and judges them and gives warnings,
+//! * `patterns` writes patterns for a projector,
 //! * [`reconstruct`] makes an image or many of what was read, [`export`] writes a recording for other
 //!   programs, `inspect` says what is in a file and how to read it.
 //!
@@ -39,6 +40,8 @@ pub mod heartbeat;
 pub mod imaging;
 #[cfg(not(target_family = "wasm"))]
 pub mod inspect;
+#[cfg(all(feature = "pictures", not(target_family = "wasm")))]
+pub mod patterns;
 #[cfg(feature = "pictures")]
 pub mod picture;
 #[cfg(not(target_family = "wasm"))]

@@ -300,6 +300,14 @@ impl Source {
         from_file(path, measurement::read(path, &want)?, options.part)
     }
 
+    /// The measurements of one sweep of a feed, which `origin` names.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn of_sweep(origin: &Path, sweep: MeasurementFile) -> Result<Self, SourceError> {
+        from_file(origin, sweep, Part::default())
+    }
+
     /// Reads all measurements of a file, or each frame of a recording.
     ///
     /// # Errors

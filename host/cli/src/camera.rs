@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use nirspi::address::CameraAddress;
 use nirspi::devices;
 use nirspi::exposure::{Exposure, Length, Light};
+use nirspi::files::feed::Address as FeedAddress;
 use nirspi::files::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
@@ -25,7 +26,8 @@ const SCENE_PX: usize = 256;
 #[command(next_help_heading = "Camera")]
 pub struct CameraArgs {
     /// Which camera: virtual, usb, usb:SERIAL, tcp:HOST:PORT, serial:PATH[:BAUD], or replay:REC[,SPEED]: a recording that
-    /// is played back with its own setup and calibration, at 1, 0.5, ... times the camera's time or at max speed
+    /// is played back with its own setup and calibration, at 1, 0.5, ... times the camera's time or at max speed. For capture
+    /// and serve also feed:ADDR: live readings of any other bench (docs/feeds.md)
     /// [default: the camera on USB, or virtual without a camera there]
     #[arg(long, value_name = "CAMERA")]
     camera: Option<CameraAddress>,
@@ -35,6 +37,14 @@ impl CameraArgs {
     /// Whether a recording plays the camera.
     pub fn is_replay(&self) -> bool {
         matches!(self.camera, Some(CameraAddress::Replay(_)))
+    }
+
+    /// The feed, if the readings come from one.
+    pub fn feed(&self) -> Option<&FeedAddress> {
+        match &self.camera {
+            Some(CameraAddress::Feed(address)) => Some(address),
+            _ => None,
+        }
     }
 
     /// The camera's address, and a note that says which camera it is if the user named no camera.

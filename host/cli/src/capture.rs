@@ -3,7 +3,7 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{self, CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
 use super::report::ReportArgs;
-use super::{Usage, address, print, progress, provenance};
+use super::{Usage, address, feed, print, progress, provenance};
 use anyhow::Result;
 use nirspi::capture::{
     CaptureOptions, CaptureReport, Origin, Preview, Progress, Seconds, StopCause, observe,
@@ -32,12 +32,16 @@ use std::sync::atomic::Ordering;
 /// On a terminal with colours, the command shows a small image of the newest frames. --quiet and NO_COLOR switch this image
 /// off.
 ///
+/// With --camera feed:ADDR, the command records the live readings of any other bench into a measurement file (.npz), which
+/// `nirspi reconstruct FILE --index all` opens: docs/feeds.md.
+///
 /// The exit code is 0 only if every frame arrived intact and the camera reports no fault. Otherwise one line says what is
 /// missing, the frames are kept, and the exit code is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap --picture seen/\n\
-    \x20 nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap")]
+    \x20 nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap\n\
+    \x20 nirspi capture --camera feed:127.0.0.1:5025 --frames 1000 --out rec.npz")]
 pub struct Args {
     #[command(flatten)]
     camera: CameraArgs,
@@ -55,7 +59,7 @@ pub struct Args {
     setup: SetupArgs,
     #[command(flatten)]
     scene: SceneArgs,
-    /// File to record into [default: the first of capture-1.mcap, capture-2.mcap, ... that does not exist]
+    /// File to record into [default: the first of capture-1.mcap, capture-2.mcap, ... that does not exist; of a feed, .npz]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Replace an existing file. The existing file stays until the new recording is complete. Until then the new recording is
@@ -80,6 +84,11 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    if let Some(address) = args.camera.feed() {
+        let Args { frames, seconds, ref out, overwrite, report, .. } = *args;
+        let out = out.as_deref();
+        return feed::capture(&feed::Capture { address, frames, seconds, out, overwrite, report });
+    }
     let mut setup = args.setup.setup(Sampling::ALL, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
     let mut frames = args.frames;

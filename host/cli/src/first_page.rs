@@ -18,6 +18,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 5] = [
             ("reconstruct", "an image of a measurement or a recording"),
             ("inspect", "what is in a file, and the command that reconstructs it"),
             ("readings", "readings of a trace: samples of an oscilloscope or ADC"),
+            ("order", "patterns as pictures or an array, for a DMD"),
             ("enhance", "images enlarged and deblurred"),
             ("deblur", "images deblurred, by a network or a classical method"),
             ("metrics", "how far two stacks of images are apart"),

@@ -20,6 +20,7 @@ mod enhance;
 mod eval;
 mod example;
 mod export;
+mod feed;
 mod first_page;
 mod flash;
 mod gateware;
@@ -29,6 +30,7 @@ mod inspect;
 mod method;
 mod metrics;
 mod networks;
+mod order;
 mod packaging;
 mod pairs;
 mod print;
@@ -97,6 +99,7 @@ commands! { Command, run:
     Reconstruct(reconstruct::Args) => reconstruct::run,
     Inspect(inspect::Args) => inspect::run,
     Readings(readings::Args) => readings::run,
+    Order(order::Args) => order::run,
     Enhance(enhance::Args) => enhance::run,
     Deblur(deblur::Args) => deblur::run,
     Metrics(metrics::Args) => metrics::run,

@@ -4,23 +4,25 @@ use super::calibration::CalibrationArgs;
 use super::camera::{self, CameraArgs, SceneArgs, SetupArgs};
 use super::method::MethodArgs;
 use super::provenance::made;
-use super::{Usage, address, print};
+use super::{Usage, address, feed, print};
 use anyhow::{Context, Result, anyhow, bail};
 use nirspi::address::CameraAddress;
 use nirspi::capture::Choice;
 use nirspi::exposure::Light;
+use nirspi::files::feed::{Address, Feed};
 use nirspi::files::{interrupt, read_small_text};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_recon::{Sampling, Side};
-use nirspi_serve::settings::{MAX_FRAMES, Settings};
+use nirspi_recon::{Order, Sampling, Side};
+use nirspi_serve::settings::{MAX_FRAMES, Measuring, Settings};
 use nirspi_serve::{
-    Access, BasePath, CameraSource, Connect, Connected, HostName, Imaging, Server, StagedScene,
-    Token, serve,
+    Access, BasePath, CameraSource, Connect, Connected, FeedSource, HostName, Imaging, Server,
+    StagedScene, Token, serve, serve_feed,
 };
 use nirspi_virtual::MemoryLink;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::Ordering;
 
 /// Show a camera live on a web page: reconstructed, enlarged and deblurred, with every frame accounted for
 ///
@@ -29,12 +31,15 @@ use std::process::ExitCode;
 /// a stop or a fault, a person must allow the LEDs to go on, on the page. Only browsers on this machine can open the page,
 /// unless --listen says otherwise; then the page demands a token. Ctrl-C switches the LEDs off and ends the program.
 ///
+/// With --camera feed:ADDR, the page shows the live readings of any other bench, without LEDs: docs/feeds.md.
+///
 /// For scripts: GET /api/state, /events, /image.png, /image.npy, /enhanced.png and /enhanced.npy; POST /api/settings, /api/scene,
 /// /api/stop and /api/start. "frames" of the settings is --sum. --backend holds for the networks, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi serve\n\
     \x20 nirspi serve --camera usb --sampling 0.3\n\
+    \x20 nirspi serve --camera feed:127.0.0.1:5025\n\
     \x20 curl http://127.0.0.1:8080/api/state\n\
     \x20 curl -d '{\"method\": \"hadamard\"}' http://127.0.0.1:8080/api/settings")]
 pub struct Args {
@@ -59,7 +64,7 @@ pub struct Args {
     /// Folder for recordings, which the page begins and ends. Without it, the page cannot record
     #[arg(long, value_name = "DIR")]
     record_to: Option<PathBuf>,
-    /// Newest frames to sum into each image
+    /// Newest frames to sum into each image; of a feed, 1 if the option is not given
     #[arg(long, alias = "frames", value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
     sum: u32,
@@ -95,10 +100,48 @@ impl Args {
         let text = read_small_text(file).with_context(named)?;
         Ok(Some(text.trim().parse::<Token>().map_err(|why| anyhow!("{}: {why}", named()))?))
     }
+
+    /// The server, listening.
+    fn server(&self) -> Result<Server> {
+        if let Some(folder) = self.record_to.as_ref().filter(|folder| !folder.is_dir()) {
+            bail!("--record-to {}: found no such folder", folder.display());
+        }
+        let access = Access {
+            token: self.token()?,
+            names: self.allow_host.clone(),
+            base_path: self.base_path.clone(),
+        };
+        Server::bind(&self.listen, access, made())
+            .with_context(|| format!("--listen {}: cannot listen there", self.listen))
+    }
+
+    /// Methods and networks, and the settings with which the page begins.
+    fn imaging(
+        &self,
+        side: Side,
+        sum: u32,
+        setup: &MeasurementSetup,
+    ) -> Result<(Imaging, Settings)> {
+        let method = &self.method;
+        let imaging = Imaging::new(&method.settings_for(side.pixels())?, method.device()?)?;
+        let settings = Settings {
+            strength: method.strength,
+            warm_start: self.warm_start,
+            ..Settings::new(method.method, sum, setup)
+        };
+        if self.warm_start {
+            let refused = |why| Usage(format!("--warm-start: {why}"));
+            imaging.check_warm_start(settings.method).map_err(refused)?;
+        }
+        Ok((imaging, settings))
+    }
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
+    if let Some(address) = args.camera.feed() {
+        return run_feed(args, address);
+    }
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
     let mut sum = args.sum;
@@ -113,27 +156,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             .into());
         }
     }
-    if let Some(folder) = args.record_to.as_ref().filter(|folder| !folder.is_dir()) {
-        bail!("--record-to {}: found no such folder", folder.display());
-    }
-    let access = Access {
-        token: args.token()?,
-        names: args.allow_host.clone(),
-        base_path: args.base_path.clone(),
-    };
-    let server = Server::bind(&args.listen, access, made())
-        .with_context(|| format!("--listen {}: cannot listen there", args.listen))?;
-    let imaging =
-        Imaging::new(&args.method.settings_for(Side::INSTRUMENT.pixels())?, args.method.device()?)?;
-    let settings = Settings {
-        strength: args.method.strength,
-        warm_start: args.warm_start,
-        ..Settings::new(args.method.method, sum, &setup)
-    };
-    if args.warm_start {
-        let refused = |why| Usage(format!("--warm-start: {why}"));
-        imaging.check_warm_start(settings.method).map_err(refused)?;
-    }
+    let server = args.server()?;
+    let (imaging, settings) = args.imaging(Side::INSTRUMENT, sum, &setup)?;
     let stop = interrupt::stop_flag();
     let (address, note) = args.camera.address_and_note()?;
     let session = address::open(&address, &args.scene)?;
@@ -149,6 +173,46 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         connect: connect(args, address, setup),
     };
     let served = serve(server, source, connected, imaging, settings, &stop)?;
+    print::line(format_args!("stopped: {served}"))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Shows a feed instead of a camera.
+fn run_feed(args: &Args, address: &Address) -> Result<ExitCode> {
+    const OWN: [&str; 15] = [
+        "listen",
+        "token",
+        "token-file",
+        "base-path",
+        "allow-host",
+        "record-to",
+        "sum",
+        "frames",
+        "warm-start",
+        "method",
+        "basis",
+        "dictionary",
+        "sparsity",
+        "strength",
+        "backend",
+    ];
+    const MORE: [&str; 4] = ["residual", "stop-at-noise", "as-printed", "non-negative"];
+    feed::refuse_others(&[&OWN[..], &MORE].concat())?;
+    let server = args.server()?;
+    let stop = interrupt::stop_flag();
+    print::remark(format_args!("{address}: waiting for the header"));
+    let feed = Feed::open(address, || !stop.load(Ordering::Relaxed))?;
+    let header = feed.header();
+    // A bench takes longer for a frame than a camera: each frame is an image.
+    let sum = if feed::is_given("sum") { args.sum } else { 1 };
+    let any = MeasurementSetup::new(&Order::Natural, 1.0)?;
+    let (imaging, settings) = args.imaging(header.side, sum, &any)?;
+    let sampling = (header.rows.len() as f64 / header.side.area() as f64).min(1.0);
+    let measuring = Measuring { order: header.order(), sampling, sweeps: 1 };
+    let settings = Settings { measuring, ..settings };
+    print::line(server.invitation(address))?;
+    let source = FeedSource { address: address.clone(), feed, record_to: args.record_to.clone() };
+    let served = serve_feed(server, source, imaging, settings, &stop)?;
     print::line(format_args!("stopped: {served}"))?;
     Ok(ExitCode::SUCCESS)
 }

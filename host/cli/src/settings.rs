@@ -18,6 +18,7 @@ use nirspi::files::settings::{
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 /// What every command takes.
 #[derive(Debug, clap::Args)]
@@ -48,6 +49,14 @@ const NEVER_SAVED: [&str; 9] =
 const SECRET: [&str; 1] = ["token"];
 /// Options that cannot have a default.
 const NO_DEFAULT: [&str; 4] = ["settings", "save-settings", "help", "version"];
+
+/// The options on the command line.
+static GIVEN: OnceLock<Vec<String>> = OnceLock::new();
+
+/// The options that the user has given on the command line, without `--`.
+pub fn given() -> &'static [String] {
+    GIVEN.get().map_or(&[], Vec::as_slice)
+}
 
 /// Why there is nothing to run.
 pub enum Refused {
@@ -80,6 +89,8 @@ pub fn parse<C: FromArgMatches>(
         | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => Refused::Help(error),
         _ => Refused::Mistake(in_words(&error, &defaults)),
     };
+    let names = line.given.iter().filter_map(|arg| arg.get_long()).map(str::to_owned);
+    let _ = GIVEN.set(names.collect());
     let matches = command.clone().try_get_matches_from(all).map_err(refused)?;
     let used = line.used(&matches);
     let cli = C::from_arg_matches(&matches).map_err(refused)?;

@@ -13,6 +13,7 @@ use super::array::{
     ArrayError, Header, MAX_MEMORY_BYTES, NUMBERS, Sample, Take, claims, has_shape,
 };
 use super::field::Field;
+use super::npy;
 use super::plain::{kind_by_start, open_file};
 use super::stored::{EXPECTED, Stored, damaged};
 pub use members::{Members, write_members};
@@ -33,7 +34,7 @@ const OTHERS: [(&str, &str); 3] = [
 ];
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
-const MAX_FIELD_BYTES: u64 = 256 << 20;
+pub(super) const MAX_FIELD_BYTES: u64 = 256 << 20;
 
 /// An open archive.
 pub struct Archive {
@@ -194,6 +195,12 @@ impl Archive {
             },
         )?;
         Ok(found)
+    }
+
+    /// A field that is one short text; `None` for any other.
+    pub(super) fn text(&mut self, field: &str) -> Option<String> {
+        let mut member = self.zip.by_name(&format!("{field}{MEMBER_SUFFIX}")).ok()?;
+        npy::read_text(&mut member)
     }
 
     /// The type of the numbers of a field, as NumPy calls it; `None` if they are no numbers.

@@ -145,6 +145,22 @@ impl Fields {
         }
     }
 
+    /// The fields of no file, which `path` names in messages.
+    pub(super) fn of_fields(path: &Path, fields: Vec<(String, Field)>) -> Self {
+        let (names, fields) = fields.into_iter().unzip();
+        let (made, called) = (Vec::new(), Vec::new());
+        let format = Format::Columns(fields);
+        Self { path: path.to_owned(), names, format, made, called, skipped: None, is_text: false }
+    }
+
+    /// A field that is one text, if the file is a NumPy archive and has it.
+    pub(super) fn text(&mut self, field: &str) -> Option<String> {
+        match &mut self.format {
+            Format::Npz(archive) => archive.text(field),
+            _ => None,
+        }
+    }
+
     /// Whether the file is a text.
     pub(super) fn is_text(&self) -> bool {
         self.is_text

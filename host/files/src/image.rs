@@ -289,5 +289,25 @@ fn encode(
     bytes
 }
 
+/// A square picture of black and white: 8 pixels in a byte, the first in the highest bit; each line begins with a byte.
+///
+/// # Panics
+/// If there are not as many bytes as the picture has.
+#[must_use]
+pub fn encode_bits(side: u32, bits: &[u8], provenance: &Provenance) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let encoded = (|| {
+        let mut encoder = png::Encoder::new(&mut bytes, side, side);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::One);
+        sign(&mut encoder, provenance)?;
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(bits)?;
+        writer.finish()
+    })();
+    encoded.expect("a picture of as many bits as it has pixels encodes into memory");
+    bytes
+}
+
 #[cfg(test)]
 mod tests;

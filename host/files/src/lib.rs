@@ -19,6 +19,8 @@ pub mod clock;
 #[cfg(not(target_family = "wasm"))]
 pub mod contents;
 #[cfg(not(target_family = "wasm"))]
+pub mod feed;
+#[cfg(not(target_family = "wasm"))]
 pub mod folder;
 pub mod identity;
 #[cfg(feature = "pictures")]

@@ -17,6 +17,7 @@
 //! | `y` | `(..., 2 M)` or `(..., M, 2)` raw readings in time order +, -, +, -; other forms by [`Selection::form`]; NaN: not read |
 //! | `d` | `(..., M)` differential readings; NaN: not read |
 //! | `sign` | optional, as many as readings: 1 for a pattern, -1 or 0 for a complement, of the same row of `h_row` or else of the next one |
+//! | `readings` | optional, with `y`, a text: its form, unless [`Selection::form`] is given |
 //! | `simulated` | optional: 1 if no real light was measured |
 //! | `noise` | optional, with `d`: standard deviation of the noise of a value of `d`, the same for all |
 //! | `recon` | optional `(n, n)`, or one for each measurement: someone's reconstruction, to compare with |
@@ -43,6 +44,7 @@ mod remedy;
 mod rows;
 mod sides;
 mod stack;
+mod sweeps;
 mod write;
 
 use super::FileError;
@@ -52,12 +54,15 @@ pub use images::read_images_of;
 use nirspi_recon::law::Claim;
 use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
+pub(crate) use opened::is_reading;
 pub use patterns::{PatternSelection, Patterns};
 pub use plain::{Plain, read_plain};
 use rayon::prelude::*;
 pub use remedy::Remedy;
 pub use stack::Stack;
 use std::path::Path;
+pub use sweeps::{Sweeps, most_together};
+pub(crate) use write::READINGS;
 pub use write::{NOISE, PROVENANCE, encode, write_readings};
 
 /// What to read from a file, and what the file itself does not say.

@@ -264,7 +264,28 @@ pub fn encode_text(text: &str) -> Vec<u8> {
     bytes
 }
 
-fn header_of(descr: &str, shape: &[usize]) -> Vec<u8> {
+/// The most bytes of a text that is read.
+const MAX_TEXT_BYTES: u64 = 4096;
+
+/// The text that [`encode_text`] wrote; `None` for anything else.
+pub(super) fn read_text(stream: &mut impl Read) -> Option<String> {
+    let mut bytes = Vec::new();
+    stream.take(MAX_TEXT_BYTES).read_to_end(&mut bytes).ok()?;
+    let after = bytes.strip_prefix(&MAGIC[..])?;
+    let length = usize::from(u16::from_le_bytes([*after.get(2)?, *after.get(3)?]));
+    let header = std::str::from_utf8(after.get(4..4 + length)?).ok()?;
+    let (letters, _) = header.split_once("'<U")?.1.split_once('\'')?;
+    let text = after.get(4 + length..)?;
+    let letters = letters.parse::<usize>().ok()?;
+    let read = || {
+        let letter = |bytes: &[u8; 4]| char::from_u32(u32::from_le_bytes(*bytes));
+        let text: Option<String> = text.as_chunks().0.iter().map(letter).collect();
+        Some(text?.trim_end_matches('\0').to_owned())
+    };
+    if letters.checked_mul(4) == Some(text.len()) { read() } else { None }
+}
+
+pub(super) fn header_of(descr: &str, shape: &[usize]) -> Vec<u8> {
     /// The data start at a multiple of this number of bytes, so that NumPy can map the file.
     const ALIGNMENT: usize = 64;
     let axes: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();

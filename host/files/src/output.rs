@@ -24,7 +24,7 @@ use super::FileError;
 use super::interrupt::Noted;
 use earlier::Earlier;
 use std::fs;
-use std::io::{self, BufWriter, IntoInnerError, Write};
+use std::io::{self, BufWriter, IntoInnerError, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempPath;
 
@@ -322,29 +322,71 @@ fn stage<T, E: From<FileError>>(
     target: &Path,
     fill: impl FnOnce(&mut BufWriter<fs::File>) -> Result<T, E>,
 ) -> Result<(T, Staged), E> {
-    // A link stays: the file behind it is replaced, and the hidden file is beside that one.
-    let behind = fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
-    let folder = folder_of(&behind);
-    // The error names the missing folder, not the hidden file in it.
-    if let Err(error) = fs::metadata(folder) {
-        return Err(FileError::io(folder, "write to", error).into());
-    }
-    let write = |error: io::Error| FileError::io(target, "write", error);
-    // This function makes the file itself, because errors of `tempfile` hide the system's reason.
-    // Other users may read results as far as the umask allows.
-    let staged = tempfile::Builder::new()
-        .prefix(STAGED_PREFIX)
-        .make_in(folder, |path| Noted::make(path, || fs::File::create_new(path)))
-        .map_err(write)?;
-    let ((file, noted), path) = staged.into_parts();
-    let staged = Staged { path, behind, _noted: noted };
+    let (file, staged) = hidden(target)?;
     let mut file = BufWriter::new(file);
     let filled = fill(&mut file)?;
     file.into_inner()
         .map_err(IntoInnerError::into_error)
         .and_then(|file| file.sync_all())
-        .map_err(write)?;
+        .map_err(|error| FileError::io(target, "write", error))?;
     Ok((filled, staged))
+}
+
+/// Makes a file under a hidden name beside the file that it will be.
+fn hidden(target: &Path) -> Result<(fs::File, Staged), FileError> {
+    // A link stays: the file behind it is replaced, and the hidden file is beside that one.
+    let behind = fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
+    let folder = folder_of(&behind);
+    // The error names the missing folder, not the hidden file in it.
+    if let Err(error) = fs::metadata(folder) {
+        return Err(FileError::io(folder, "write to", error));
+    }
+    // This function makes the file itself, because errors of `tempfile` hide the system's reason.
+    // Other users may read results as far as the umask allows.
+    let make = |path: &Path| {
+        let open = || fs::OpenOptions::new().read(true).write(true).create_new(true).open(path);
+        Noted::make(path, open)
+    };
+    let made = tempfile::Builder::new().prefix(STAGED_PREFIX).make_in(folder, make);
+    let staged = made.map_err(|error| FileError::io(target, "write", error))?;
+    let ((file, noted), path) = staged.into_parts();
+    Ok((file, Staged { path, behind, _noted: noted }))
+}
+
+/// A hidden file beside a result, with numbers that become part of the result later. It is removed when it is dropped.
+#[derive(Debug)]
+pub(crate) struct Spool {
+    file: fs::File,
+    _staged: Staged,
+}
+
+impl Spool {
+    /// A new, empty one.
+    pub(crate) fn beside(target: &Path) -> Result<Self, FileError> {
+        hidden(target).map(|(file, _staged)| Self { file, _staged })
+    }
+}
+
+impl Write for Spool {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Read for Spool {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.file.read(bytes)
+    }
+}
+
+impl Seek for Spool {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
 }
 
 /// A file under its hidden name.

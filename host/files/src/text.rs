@@ -228,7 +228,7 @@ impl Separators {
 
 /// The number that a word states, with the point or comma of its decimals; NaN for a reading that was not
 /// taken, 9.9e37 for one beyond what an instrument measures.
-fn parse(word: &str, decimal: char) -> Option<f64> {
+pub(super) fn parse(word: &str, decimal: char) -> Option<f64> {
     let word = word.trim_matches('"');
     if let Some(number) = plain_number(word, decimal) {
         return Some(number);

@@ -34,11 +34,13 @@ pub enum Raw {
     F64,
     /// Signed 16-bit integers.
     I16,
+    /// Signed 32-bit integers.
+    I32,
 }
 
 impl Raw {
     /// Every kind.
-    pub const ALL: [Self; 3] = [Self::F32, Self::F64, Self::I16];
+    pub const ALL: [Self; 4] = [Self::F32, Self::F64, Self::I16, Self::I32];
 
     /// The word for the kind.
     #[must_use]
@@ -47,6 +49,7 @@ impl Raw {
             Self::F32 => "f32",
             Self::F64 => "f64",
             Self::I16 => "i16",
+            Self::I32 => "i32",
         }
     }
 
@@ -57,6 +60,61 @@ impl Raw {
             Self::F32 => "32-bit floats",
             Self::F64 => "64-bit floats",
             Self::I16 => "signed 16-bit integers",
+            Self::I32 => "signed 32-bit integers",
+        }
+    }
+
+    /// Bytes of a number.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::I16 => 2,
+            Self::F32 | Self::I32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// The type as NumPy writes it.
+    pub(super) fn descr(self) -> &'static str {
+        match self {
+            Self::F32 => "<f4",
+            Self::F64 => "<f8",
+            Self::I16 => "<i2",
+            Self::I32 => "<i4",
+        }
+    }
+
+    /// The number in these bytes, as many as a number of this kind has.
+    pub(super) fn number(self, bytes: &[u8]) -> f64 {
+        let mut number = Vec::with_capacity(1);
+        self.numbers(bytes, &mut number);
+        number[0]
+    }
+
+    /// Appends the numbers in these bytes.
+    pub(super) fn numbers(self, bytes: &[u8], numbers: &mut Vec<f64>) {
+        fn each<const N: usize>(
+            bytes: &[u8],
+            numbers: &mut Vec<f64>,
+            number: impl Fn([u8; N]) -> f64,
+        ) {
+            numbers.extend(bytes.as_chunks().0.iter().map(|&bytes| number(bytes)));
+        }
+        match self {
+            Self::F32 => each(bytes, numbers, |b| f32::from_le_bytes(b).into()),
+            Self::F64 => each(bytes, numbers, f64::from_le_bytes),
+            Self::I16 => each(bytes, numbers, |b| i16::from_le_bytes(b).into()),
+            Self::I32 => each(bytes, numbers, |b| i32::from_le_bytes(b).into()),
+        }
+    }
+
+    /// Appends the bytes of a number. A number beyond the kind's range becomes its nearest.
+    pub(super) fn append(self, number: f64, bytes: &mut Vec<u8>) {
+        match self {
+            Self::F32 => bytes.extend_from_slice(&(number as f32).to_le_bytes()),
+            Self::F64 => bytes.extend_from_slice(&number.to_le_bytes()),
+            Self::I16 => bytes.extend_from_slice(&(number as i16).to_le_bytes()),
+            Self::I32 => bytes.extend_from_slice(&(number as i32).to_le_bytes()),
         }
     }
 }
@@ -66,7 +124,7 @@ impl std::str::FromStr for Raw {
 
     fn from_str(word: &str) -> Result<Self, String> {
         let known = Self::ALL.into_iter().find(|raw| raw.name() == word);
-        known.ok_or_else(|| "expected f32, f64 or i16".to_owned())
+        known.ok_or_else(|| "expected f32, f64, i16 or i32".to_owned())
     }
 }
 

@@ -62,7 +62,7 @@ REFUSED = [
     (lambda: ns.Measurement.from_trace("t.npy", samples=0, rows="natural", n=8), "samples is 0"),
     (
         lambda: ns.Measurement.from_trace("t", samples=1, raw="i8", rows="natural", n=8),
-        "expected f32, f64 or i16",
+        "expected f32, f64, i16 or i32",
     ),
     (lambda: ns.read("t.npy", skip=3), "skip without samples and trigger"),
     (lambda: ns.Measurement.from_table(np.zeros(4)), "table is ndarray, expected columns"),

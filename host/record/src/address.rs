@@ -1,11 +1,12 @@
 //! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]` and
-//! `replay:REC[,SPEED]`.
+//! `replay:REC[,SPEED]`; and of [feeds](nirspi_files::feed), `feed:ADDR`, which are benches of any other kind.
 
 use crate::recording::RecordingError;
 use crate::replay::{ReplayAddress, ReplayLink};
 use nirspi_camera::link::usb::UsbError;
 use nirspi_camera::link::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
 use nirspi_camera::session::{Session, SessionError};
+use nirspi_files::feed::Address as FeedAddress;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;
@@ -30,6 +31,8 @@ pub enum CameraAddress {
     Usb(Option<String>),
     /// A recording that is played back as a camera.
     Replay(ReplayAddress),
+    /// Live readings of a bench that is no camera of nirspi.
+    Feed(FeedAddress),
 }
 
 impl FromStr for CameraAddress {
@@ -40,6 +43,7 @@ impl FromStr for CameraAddress {
             None if text == "virtual" => Ok(Self::Virtual),
             None if text == "usb" => Ok(Self::Usb(None)),
             Some(("usb", serial)) if !serial.is_empty() => Ok(Self::Usb(Some(serial.to_owned()))),
+            Some(("feed", address)) => address.parse().map(Self::Feed),
             Some(("replay", recording)) => recording.parse().map(Self::Replay),
             Some(("tcp", address)) if address.contains(':') => Ok(Self::Tcp(address.to_owned())),
             Some(("serial", port)) if !port.is_empty() => {
@@ -51,7 +55,8 @@ impl FromStr for CameraAddress {
                 Ok(Self::Serial { path: PathBuf::from(path), baud })
             }
             _ => {
-                Err("expected virtual, usb, usb:SERIAL, tcp:HOST:PORT, serial:PATH[:BAUD] or replay:REC[,SPEED]"
+                Err("expected virtual, usb, usb:SERIAL, tcp:HOST:PORT, serial:PATH[:BAUD], replay:REC[,SPEED] or \
+                      feed:ADDR"
                     .to_owned())
             }
         }
@@ -67,6 +72,7 @@ impl fmt::Display for CameraAddress {
             Self::Usb(None) => f.write_str("usb"),
             Self::Usb(Some(serial)) => write!(f, "usb:{serial}"),
             Self::Replay(recording) => recording.fmt(f),
+            Self::Feed(address) => address.fmt(f),
         }
     }
 }
@@ -98,6 +104,11 @@ pub enum OpenError {
     /// There is no such camera on USB, or the camera cannot be used.
     #[error(transparent)]
     Usb(#[from] UsbError),
+    /// A feed is no camera.
+    #[error(
+        "{0}: a feed sends readings and takes no commands: nirspi capture and nirspi serve read it"
+    )]
+    Feed(FeedAddress),
     /// The device at the address does not answer as a camera.
     #[error("{camera}")]
     Session {
@@ -141,6 +152,7 @@ impl CameraAddress {
                 SerialLink::open(path, *baud)
                     .map_err(|problem| OpenError::Serial { path: path.clone(), problem })?,
             ),
+            Self::Feed(address) => return Err(OpenError::Feed(address.clone())),
             // The link's errors name the camera and say what to do.
             Self::Usb(serial) => Box::new(UsbLink::open(serial.as_deref())?),
         };
@@ -190,6 +202,8 @@ mod tests {
             ("replay:a,b.mcap", replay("a,b.mcap", Speed::Times(1.0))),
             ("usb:0042:A", CameraAddress::Usb(Some("0042:A".to_owned()))),
             ("tcp:[::1]:1550", CameraAddress::Tcp("[::1]:1550".to_owned())),
+            ("feed:host:5025", CameraAddress::Feed("host:5025".parse().unwrap())),
+            ("feed:-", CameraAddress::Feed(FeedAddress::Stdin)),
             ("serial:/dev/ttyACM0", serial("/dev/ttyACM0", DEFAULT_BAUD)),
             ("serial:COM7:3000000", serial("COM7", 3_000_000)),
             ("serial:/dev/by-path/pci:0", serial("/dev/by-path/pci:0", DEFAULT_BAUD)),
@@ -198,7 +212,9 @@ mod tests {
             assert_eq!(text.parse(), Ok(expected.clone()), "{text}");
             assert!(!plain || expected.to_string() == text, "{expected}");
         }
-        for text in ["", "replay:", "replay:,max", "usb:", "tcp:nowhere", "serial:", "fax:1"] {
+        for text in
+            ["", "replay:", "replay:,max", "usb:", "tcp:nowhere", "serial:", "feed:", "fax:1"]
+        {
             assert!(text.parse::<CameraAddress>().is_err(), "{text}");
         }
     }

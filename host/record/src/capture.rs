@@ -10,6 +10,8 @@
 //! (`missing::tests::a_capture_is_whole_only_if_nothing_is_missing`). The frames that a camera
 //! delivers limit what this program writes (`junk::tests`).
 
+#[cfg(not(target_family = "wasm"))]
+mod feed;
 mod files;
 mod flat_field;
 mod frames_due;
@@ -22,6 +24,8 @@ mod report;
 mod run;
 mod seconds;
 
+#[cfg(not(target_family = "wasm"))]
+pub use feed::{FeedProgress, FeedReport, record_feed};
 pub use flat_field::{FlatFieldError, measure_dark, measure_flat_field};
 pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};
 #[cfg(feature = "pictures")]

@@ -7,7 +7,7 @@
 use super::camera_log::Phase;
 use super::delays::Passed;
 use super::light::Leds;
-use super::look::{DepthImage, Look, RunSetup};
+use super::look::{DepthImage, Look, RunSetup, Seen};
 use super::overload::Load;
 use super::settings::Measuring;
 use super::stage::StagedScene;
@@ -498,9 +498,11 @@ impl Observer for Live {
         newest.push(frame, lock(&self.shared.settings).frames as usize);
         self.offered += 1;
         let look = Look {
-            sum: newest.sum(),
-            run: Arc::clone(run),
-            depth: self.depth.clone(),
+            seen: Seen::Camera {
+                sum: newest.sum(),
+                run: Arc::clone(run),
+                depth: self.depth.clone(),
+            },
             arrived: self.arrived,
             counters: *counters,
             newest: self.offered,

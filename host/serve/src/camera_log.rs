@@ -5,7 +5,11 @@ use nirspi::account::FailedChecks;
 use nirspi::boards;
 use nirspi::clock::{self, Instant};
 use nirspi::events::Level;
+#[cfg(feature = "server")]
+use nirspi::files::feed::{Account, Address, Header};
 use nirspi::identity::CameraIdentity;
+#[cfg(feature = "server")]
+use nirspi::provenance::{Origin, Taken};
 use nirspi::setup::MeasurementSetup;
 use nirspi::versions::{self, Part};
 use nirspi_wire::Status;
@@ -37,6 +41,9 @@ pub enum Phase {
     Uncalibrated,
     /// The link is gone; the thread tries to reconnect.
     Lost,
+    /// A feed sends nothing.
+    #[cfg(feature = "server")]
+    Silent,
 }
 
 /// The state of the camera.
@@ -57,7 +64,12 @@ pub struct CameraState {
     /// When the LEDs were last known to be on or off.
     #[serde(skip)]
     leds_known: Instant,
-    pub(super) identity: CameraIdentity,
+    /// The camera; `null` for a feed.
+    identity: Option<CameraIdentity>,
+    /// The feed, if readings come from one.
+    #[cfg(feature = "server")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) feed: Option<FeedState>,
     versions: Vec<Part>,
     #[serde(skip_serializing_if = "Option::is_none")]
     measurement: Option<Measurement>,
@@ -66,6 +78,16 @@ pub struct CameraState {
 }
 
 impl CameraState {
+    /// Where the readings come from.
+    #[cfg(feature = "server")]
+    pub fn taken(&self) -> Taken {
+        match (&self.identity, &self.feed) {
+            (Some(identity), _) => Taken::by(identity),
+            (None, Some(feed)) => feed.taken.clone(),
+            (None, None) => Taken::without_camera(Origin::Unknown),
+        }
+    }
+
     /// Records what is known of the LEDs now.
     pub fn leds_are(&mut self, leds: Leds) {
         self.leds_were(leds, Instant::now());
@@ -88,6 +110,22 @@ impl CameraState {
             self.leds = Leds::Unknown;
         }
     }
+}
+
+/// A feed, by its header, and what became of its numbers.
+#[cfg(feature = "server")]
+#[derive(Debug, Clone, Serialize)]
+pub struct FeedState {
+    name: Option<String>,
+    unit: Option<String>,
+    n: usize,
+    order: String,
+    patterns: usize,
+    readings: &'static str,
+    /// What became of its numbers.
+    pub account: Account,
+    #[serde(skip)]
+    taken: Taken,
 }
 
 /// What a camera last said of itself beside its frames.
@@ -144,7 +182,9 @@ impl CameraLog {
             leds: Leds::Off,
             leds_age_ms: 0,
             leds_known: Instant::now(),
-            identity: identity.clone(),
+            identity: Some(identity.clone()),
+            #[cfg(feature = "server")]
+            feed: None,
             versions: Vec::new(),
             measurement: None,
             said: Said::default(),
@@ -154,9 +194,53 @@ impl CameraLog {
         log
     }
 
+    /// The log of a feed.
+    #[cfg(feature = "server")]
+    pub fn of_feed(address: &Address) -> Self {
+        let camera = CameraState {
+            address: address.to_string(),
+            simulated: false,
+            phase: Phase::Preparing,
+            line: String::new(),
+            leds: Leds::None,
+            leds_age_ms: 0,
+            leds_known: Instant::now(),
+            identity: None,
+            feed: None,
+            versions: Vec::new(),
+            measurement: None,
+            said: Said::default(),
+        };
+        Self { camera, events: VecDeque::new() }
+    }
+
+    /// Records that the header of a feed has come.
+    #[cfg(feature = "server")]
+    pub fn fed(&mut self, header: &Header, taken: Taken) {
+        self.camera.simulated = header.simulated == Some(true);
+        let line = format!(
+            "{} x {}, order {}",
+            header.side.pixels(),
+            header.side.pixels(),
+            header.order()
+        );
+        self.camera.feed = Some(FeedState {
+            name: header.name.clone(),
+            unit: header.unit.clone(),
+            n: header.side.pixels(),
+            order: header.order(),
+            patterns: header.rows.len(),
+            readings: header.form.name(),
+            account: Account::default(),
+            taken,
+        });
+        self.event(Level::Info, format!("a feed has begun: {line}"));
+        self.enter(Phase::Measuring, "receiving the first frame".to_owned());
+    }
+
     /// Records that a camera has answered; the camera may be another one than before.
     pub fn greeted(&mut self, identity: &CameraIdentity) {
-        self.camera.identity = identity.clone();
+        self.camera.identity = Some(identity.clone());
         self.camera.simulated = boards::is_simulated(&identity.board);
         self.camera.versions = versions::compare(identity, None);
         self.camera.measurement = None;

@@ -28,8 +28,8 @@ use futures_util::stream::{Stream, unfold};
 use nirspi::causes::printable;
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
-use nirspi::provenance::{Made, Taken};
-use nirspi_nets::{deblur, fusion};
+use nirspi::provenance::Made;
+use nirspi_nets::deblur;
 use serde::Serialize;
 use std::convert::Infallible;
 use std::io;
@@ -266,7 +266,8 @@ async fn next_state(State(app): State<App>, uri: Uri) -> Response {
 
 async fn image(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    png(&app, fusion::SIDE, picture.map(|picture| picture.shares_of_white()).as_deref())
+    let side = picture.as_ref().map_or(0, |picture| picture.n);
+    png(&app, side, picture.map(|picture| picture.shares_of_white()).as_deref())
 }
 
 async fn enhanced(State(app): State<App>) -> Response {
@@ -277,7 +278,8 @@ async fn enhanced(State(app): State<App>) -> Response {
 /// ADC counts.
 async fn image_numbers(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    numbers(fusion::SIDE, picture.as_ref().map(|picture| picture.counts.as_slice()))
+    let side = picture.as_ref().map_or(0, |picture| picture.n);
+    numbers(side, picture.as_ref().map(|picture| picture.counts.as_slice()))
 }
 
 /// Shares of white.
@@ -292,7 +294,7 @@ fn no_image() -> Response {
 
 fn png(app: &App, side: usize, pixels: Option<&[f32]>) -> Response {
     let Some(pixels) = pixels else { return no_image() };
-    let provenance = Taken::by(&lock(&app.shared.camera).camera.identity).made(&app.made);
+    let provenance = lock(&app.shared.camera).camera.taken().made(&app.made);
     let png = encode_grey(side, side, pixels, &provenance);
     ([(header::CONTENT_TYPE, "image/png")], png).into_response()
 }

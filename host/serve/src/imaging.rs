@@ -3,7 +3,7 @@
 
 use super::delays::Passed;
 use super::line::Line;
-use super::look::Look;
+use super::look::{Look, Measured, MeasuredError};
 use super::moving::Moving;
 use super::picture::{Enhancement, Picture};
 use super::settings::{Offer, Settings, alternatives};
@@ -16,8 +16,7 @@ use nirspi::imaging::{
     Enhance, EnhanceError, ImageContext, KnownReadings, MethodReport, SteadyWhite, Warning, White,
     enhance_frame,
 };
-use nirspi::integrate::IntegrateError;
-use nirspi_nets::deblur::Model;
+use nirspi_nets::deblur::{self, Model};
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
 use nirspi_recon::reconstruct::{
     Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Report, Setting,
@@ -35,11 +34,11 @@ enum PictureError {
     Method(&'static str),
     /// The frames give no measurements.
     #[error(transparent)]
-    Measurements(#[from] IntegrateError),
+    Measurements(#[from] MeasuredError),
     /// The method gives no image.
     #[error(transparent)]
     Reconstruct(#[from] ReconstructError),
-    /// The image does not have the instrument's size, or has a pixel that is not finite.
+    /// The image has a pixel that is not finite.
     #[error("the frames gave no image of finite numbers")]
     NotFinite,
     /// The weights of the network are damaged.
@@ -328,11 +327,10 @@ impl Imaging {
         shared: &Shared,
     ) -> Result<Picture, PictureError> {
         let started = Instant::now();
-        let measurements =
-            look.sum.measurements(&look.run.setup, look.run.settling.as_ref(), false)?;
+        let Measured { measurements, warnings: frame_warnings } = look.measured()?;
         let method = self.method(settings)?;
         let made = moving.image(method, &measurements, look, settings)?;
-        let flat_field = look.run.flat_field.as_ref();
+        let flat_field = look.flat_field();
         let for_networks = settings
             .enhance
             .then(|| FlatField::corrected(flat_field, made.with_readings(&measurements)));
@@ -341,18 +339,19 @@ impl Imaging {
         let image = FlatField::corrected(flat_field, image);
         let reconstruct_ms = ms_since(started);
         let side = image.side().pixels();
-        if side != Side::INSTRUMENT.pixels() || image.pixels().iter().any(|p| !p.is_finite()) {
+        if image.pixels().iter().any(|p| !p.is_finite()) {
             return Err(PictureError::NotFinite);
         }
         shared.passed(Passed::Reconstructed, look.arrived);
         let white_counts = white.follow(White::Brightest.level(&image));
-        let frame_warnings = look.sum.warnings();
         let mut all = frame_warnings.clone();
         let (mut enhanced, mut enhancement, mut short) = (None, None, Vec::new());
         let mut half_width = None;
-        if let Some(given) = for_networks.filter(|_| white_counts > 0.0) {
+        // The networks know images of two sizes.
+        let is_known = [Side::INSTRUMENT.pixels(), deblur::SIDE].contains(&side);
+        if let Some(given) = for_networks.filter(|_| white_counts > 0.0 && is_known) {
             let started = Instant::now();
-            let depth = look.depth.as_ref().map(|depth| &depth.map);
+            let depth = look.depth().map(|depth| &depth.map);
             let (rows, readings) = (Some(measurements.rows()), known);
             let known = ImageContext { rows, readings, depth, ..ImageContext::default() };
             let enhance = self.enhance(settings)?;
@@ -364,30 +363,33 @@ impl Imaging {
                 blur_px: made.blur_px,
                 noise: made.noise,
                 inconsistency: made.inconsistency,
-                depth: look.depth.is_some(),
+                depth: look.depth().is_some(),
                 enhance_ms: ms_since(started),
             });
             (enhanced, half_width) = (Some(made.pixels), made.half_width);
             shared.passed(Passed::Enhanced, look.arrived);
         }
+        let (order, patterns, sweeps) = look.patterns();
         Ok(Picture {
             number: shared.slot.ledger().images.shown + 1,
             counts: image.pixels().to_vec(),
             enhanced,
             half_width,
             readings: readings(&measurements),
-            depth: look.depth.clone(),
+            depth: look.depth().cloned(),
             #[cfg(feature = "server")]
             arrived: look.arrived,
             arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed()))
                 .as_millis() as u64,
             method: settings.method,
-            order: look.run.setup.order.clone(),
-            patterns: look.run.setup.rows.len(),
-            sweeps: look.run.setup.sweeps,
+            n: side,
+            unit: look.unit(),
+            order,
+            patterns,
+            sweeps,
             run_frames: look.counters,
             past: report.warm.then(|| report.note.unwrap_or_default()),
-            frames: look.sum.frames(),
+            frames: look.frames(),
             white_counts,
             reconstruct_ms,
             enhancement,

@@ -30,6 +30,8 @@ mod commands;
 #[cfg(feature = "server")]
 mod connections;
 mod delays;
+#[cfg(feature = "server")]
+mod feed;
 #[cfg(all(fuzzing, feature = "server"))]
 pub mod fuzzing;
 #[cfg(feature = "server")]
@@ -47,6 +49,8 @@ mod page;
 #[cfg(feature = "server")]
 mod pages;
 mod picture;
+#[cfg(feature = "server")]
+mod rest;
 #[cfg(feature = "server")]
 mod server;
 pub mod settings;
@@ -67,6 +71,8 @@ pub use access::{Access, HostName, HostNameError};
 pub use base_path::{BasePath, BasePathError};
 pub use begin::TurnsError;
 pub use camera::{CameraSource, Connect, Connected};
+#[cfg(feature = "server")]
+pub use feed::FeedSource;
 pub use imaging::{Imaging, ImagingError};
 pub use line::Line;
 #[cfg(feature = "server")]
@@ -74,7 +80,7 @@ pub use server::{BindError, Server};
 pub use slot::{ImageCounters, Ledger};
 pub use stage::StagedScene;
 #[cfg(feature = "server")]
-pub use threads::{ServeError, Served, serve};
+pub use threads::{ServeError, Served, serve, serve_feed};
 #[cfg(feature = "server")]
 pub use token::{Token, TokenError};
 pub use turns::Turns;

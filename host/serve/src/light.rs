@@ -19,6 +19,9 @@ pub enum Leds {
     Off,
     /// The link to the camera is gone. The camera switches its LEDs off by itself.
     Unknown,
+    /// There are none that this program could switch: readings come from a feed.
+    #[cfg(feature = "server")]
+    None,
 }
 
 /// Whether light is allowed. The lowest bit is the position, the other bits count the commands, so

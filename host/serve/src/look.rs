@@ -3,11 +3,23 @@
 use nirspi::account::LossCounters;
 use nirspi::calibration::FlatField;
 use nirspi::clock::Instant;
-use nirspi::integrate::Integrated;
+#[cfg(feature = "server")]
+use nirspi::files::feed::Header;
+#[cfg(feature = "server")]
+use nirspi::files::measurement::Sweeps;
+use nirspi::integrate::{IntegrateError, Integrated};
 use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
+#[cfg(feature = "server")]
+use nirspi::source::{Source, SourceError};
 use nirspi_nets::DepthMaps;
+use nirspi_recon::Measurements;
+#[cfg(feature = "server")]
+use std::fmt;
+#[cfg(feature = "server")]
+use std::path::PathBuf;
 use std::sync::Arc;
+use thiserror::Error;
 
 /// One run's setup and the camera's response: everything needed to interpret its frames.
 #[derive(Debug)]
@@ -29,19 +41,181 @@ pub struct DepthImage {
     pub pixels_m: Vec<f32>,
 }
 
-/// The newest frames, and the newest depth map.
+/// The newest frames.
 #[derive(Debug, Clone)]
 pub struct Look {
-    /// The sum of the frames.
-    pub sum: Integrated,
-    /// How the frames were measured.
-    pub run: Arc<RunSetup>,
-    /// The newest depth map.
-    pub depth: Option<Arc<DepthImage>>,
+    /// The frames.
+    pub seen: Seen,
     /// When the newest frame came out of the link.
     pub arrived: Instant,
     /// The loss counters of its run, with the newest frame.
     pub counters: LossCounters,
     /// Number of the newest frame among those received, from 1 on.
     pub newest: u64,
+}
+
+/// Frames of a camera or of a feed.
+#[derive(Debug, Clone)]
+pub enum Seen {
+    /// The sum of frames, how they were measured, and the newest depth map.
+    Camera { sum: Integrated, run: Arc<RunSetup>, depth: Option<Arc<DepthImage>> },
+    /// Frames of a feed, and what they are.
+    #[cfg(feature = "server")]
+    Feed { frames: Vec<Arc<[f64]>>, bench: Arc<Bench> },
+}
+
+/// A feed: everything needed to interpret its frames.
+#[cfg(feature = "server")]
+pub struct Bench {
+    /// The header.
+    pub header: Header,
+    /// The address, for messages.
+    pub origin: PathBuf,
+    /// Makes measurements of readings.
+    pub sweeps: Sweeps,
+}
+
+#[cfg(feature = "server")]
+impl fmt::Debug for Bench {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bench").field("origin", &self.origin).finish_non_exhaustive()
+    }
+}
+
+/// The run of frames, by which looks of another run are known.
+#[derive(Debug, Clone)]
+pub enum Run {
+    /// A run of a camera.
+    Camera(Arc<RunSetup>),
+    /// A feed from its header to its end.
+    #[cfg(feature = "server")]
+    Feed(Arc<Bench>),
+}
+
+/// What frames have measured.
+#[derive(Debug)]
+pub struct Measured {
+    /// The measurements.
+    pub measurements: Measurements,
+    /// What contradicts them, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Why frames give no measurements.
+#[derive(Debug, Error)]
+pub enum MeasuredError {
+    /// The frames of a camera.
+    #[error(transparent)]
+    Camera(#[from] IntegrateError),
+    /// The frames of a feed.
+    #[cfg(feature = "server")]
+    #[error(transparent)]
+    Feed(#[from] SourceError),
+}
+
+impl Run {
+    /// Whether this is the run of the look.
+    pub fn is_of(&self, look: &Look) -> bool {
+        match (self, &look.seen) {
+            (Self::Camera(own), Seen::Camera { run, .. }) => Arc::ptr_eq(own, run),
+            #[cfg(feature = "server")]
+            (Self::Feed(own), Seen::Feed { bench, .. }) => Arc::ptr_eq(own, bench),
+            #[cfg(feature = "server")]
+            _ => false,
+        }
+    }
+}
+
+impl Look {
+    /// The run of the frames.
+    pub fn run(&self) -> Run {
+        match &self.seen {
+            Seen::Camera { run, .. } => Run::Camera(Arc::clone(run)),
+            #[cfg(feature = "server")]
+            Seen::Feed { bench, .. } => Run::Feed(Arc::clone(bench)),
+        }
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> u64 {
+        match &self.seen {
+            Seen::Camera { sum, .. } => sum.frames(),
+            #[cfg(feature = "server")]
+            Seen::Feed { frames, .. } => frames.len() as u64,
+        }
+    }
+
+    /// What the frames have measured.
+    ///
+    /// # Errors
+    /// [`MeasuredError`] if they give no measurements.
+    pub fn measured(&self) -> Result<Measured, MeasuredError> {
+        match &self.seen {
+            Seen::Camera { sum, run, .. } => {
+                let measurements = sum.measurements(&run.setup, run.settling.as_ref(), false)?;
+                Ok(Measured { measurements, warnings: sum.warnings() })
+            }
+            #[cfg(feature = "server")]
+            Seen::Feed { frames, bench } => {
+                let sweep = bench.sweeps.read(mean(frames)).map_err(SourceError::from)?;
+                let source = Source::of_sweep(&bench.origin, sweep)?;
+                let warnings = source.all_warnings();
+                Ok(Measured { measurements: source.measurements, warnings })
+            }
+        }
+    }
+
+    /// The flat field of the camera.
+    pub fn flat_field(&self) -> Option<&FlatField> {
+        match &self.seen {
+            Seen::Camera { run, .. } => run.flat_field.as_ref(),
+            #[cfg(feature = "server")]
+            Seen::Feed { .. } => None,
+        }
+    }
+
+    /// The newest depth map.
+    pub fn depth(&self) -> Option<&Arc<DepthImage>> {
+        match &self.seen {
+            Seen::Camera { depth, .. } => depth.as_ref(),
+            #[cfg(feature = "server")]
+            Seen::Feed { .. } => None,
+        }
+    }
+
+    /// The order of the patterns, their number, and the sweeps of a frame.
+    pub fn patterns(&self) -> (String, usize, u32) {
+        match &self.seen {
+            Seen::Camera { run, .. } => {
+                let setup = &run.setup;
+                (setup.order.clone(), setup.rows.len(), setup.sweeps)
+            }
+            #[cfg(feature = "server")]
+            Seen::Feed { bench, .. } => (bench.header.order(), bench.header.rows.len(), 1),
+        }
+    }
+
+    /// The unit of readings and pixels.
+    pub fn unit(&self) -> String {
+        match &self.seen {
+            Seen::Camera { .. } => "ADC counts".to_owned(),
+            #[cfg(feature = "server")]
+            Seen::Feed { bench, .. } => bench.header.unit.clone().unwrap_or_default(),
+        }
+    }
+}
+
+/// The mean of each reading over the frames in which it was read; NaN where it was read in none.
+#[cfg(feature = "server")]
+fn mean(frames: &[Arc<[f64]>]) -> Vec<f64> {
+    let Some(first) = frames.first() else { return Vec::new() };
+    if frames.len() == 1 {
+        return first.to_vec();
+    }
+    let mean = |at: usize| {
+        let read = frames.iter().map(|frame| frame[at]).filter(|value| !value.is_nan());
+        let (count, sum) = read.fold((0_u32, 0.0), |(count, sum), value| (count + 1, sum + value));
+        sum / f64::from(count)
+    };
+    (0..first.len()).map(mean).collect()
 }

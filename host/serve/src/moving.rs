@@ -10,11 +10,10 @@
 //! The images are those of [`Reconstruct::reconstruct_video`] for the same sums of frames
 //! (`turns::tests::images_that_start_from_those_before_are_those_of_a_recorded_video`).
 
-use super::look::{Look, RunSetup};
+use super::look::{Look, Run};
 use super::settings::Settings;
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::{Reconstruct, ReconstructError, Reconstruction, Recursive};
-use std::sync::Arc;
 
 /// What the images of one run have shown; `None` if the next image is made alone or begins an
 /// estimate.
@@ -25,7 +24,7 @@ pub struct Moving(Option<Scene>);
 #[derive(Debug)]
 struct Scene {
     past: Recursive,
-    run: Arc<RunSetup>,
+    run: Run,
     method: &'static str,
     strength: Option<f64>,
     frames: u32,
@@ -39,7 +38,7 @@ impl Scene {
     fn begin(method: &dyn Reconstruct, look: &Look, settings: &Settings) -> Option<Self> {
         Some(Self {
             past: method.begin_video().ok().flatten()?,
-            run: Arc::clone(&look.run),
+            run: look.run(),
             method: settings.method,
             strength: settings.strength,
             frames: settings.frames,
@@ -48,7 +47,7 @@ impl Scene {
     }
 
     fn holds_for(&self, look: &Look, settings: &Settings) -> bool {
-        Arc::ptr_eq(&self.run, &look.run)
+        self.run.is_of(look)
             && self.method == settings.method
             && self.strength == settings.strength
             && self.frames == settings.frames
@@ -60,7 +59,7 @@ impl Moving {
     pub fn awaits(&self, look: &Look, settings: &Settings) -> bool {
         match &self.0 {
             Some(scene) if settings.warm_start && scene.holds_for(look, settings) => {
-                look.newest.saturating_sub(scene.newest) >= look.sum.frames()
+                look.newest.saturating_sub(scene.newest) >= look.frames()
             }
             _ => true,
         }
@@ -79,7 +78,7 @@ impl Moving {
         settings: &Settings,
     ) -> Result<Reconstruction, ReconstructError> {
         let before = self.0.take().filter(|scene| scene.holds_for(look, settings));
-        let is_whole = look.sum.frames() == u64::from(settings.frames);
+        let is_whole = look.frames() == u64::from(settings.frames);
         let scene = match settings.warm_start && is_whole {
             true => before.or_else(|| Scene::begin(method, look, settings)),
             false => None,
@@ -98,6 +97,7 @@ impl Moving {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::look::{RunSetup, Seen};
     use crate::settings::tests::settings;
     use nirspi::account::LossCounters;
     use nirspi::clock::Instant;
@@ -109,6 +109,7 @@ mod tests {
     use nirspi_recon::{Image, Order, metrics};
     use nirspi_virtual::{Shot, VirtualOptics, calibrate_against_white, shoot};
     use std::ops::ControlFlow;
+    use std::sync::Arc;
     use std::sync::atomic::{AtomicU32, Ordering};
 
     /// Distance of the scene from the camera, in millimetres.
@@ -164,9 +165,11 @@ mod tests {
                 Arc::new(RunSetup { setup, settling, flat_field: None })
             });
             let look = Look {
-                sum: made.capture.integrated,
-                run: Arc::clone(run),
-                depth: None,
+                seen: Seen::Camera {
+                    sum: made.capture.integrated,
+                    run: Arc::clone(run),
+                    depth: None,
+                },
                 arrived: Instant::now(),
                 counters: LossCounters::default(),
                 newest: u64::from(FRAMES) * (k + 1),
@@ -229,7 +232,8 @@ mod tests {
             sum.add_sums((0..patterns).map(|k| 1000 / (k as i64 + 1)), 1);
             let measurements = sum.measurements(&run.setup, None, false).unwrap();
             let counters = LossCounters::default();
-            let look = Look { sum, run: Arc::clone(&run), depth: None, arrived, counters, newest };
+            let seen = Seen::Camera { sum, run: Arc::clone(&run), depth: None };
+            let look = Look { seen, arrived, counters, newest };
             let made = moving.image(&faulty, &measurements, &look, &settings);
             made.ok().map(|made| made.report.warm)
         };

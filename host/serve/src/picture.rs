@@ -14,7 +14,11 @@ use std::sync::Arc;
 pub struct Picture {
     /// The first image has number 1, each further one the next number.
     pub number: u64,
-    /// The reconstructed image, (32, 32) ADC counts.
+    /// Side of the reconstructed image: 32 for a camera.
+    pub n: usize,
+    /// The unit of readings and pixels; may be empty for a feed.
+    pub unit: String,
+    /// The reconstructed image, (n, n).
     #[serde(skip)]
     pub counts: Vec<f32>,
     /// The enhanced image, (64, 64) in [0, 1], with white at 1.
@@ -24,7 +28,7 @@ pub struct Picture {
     /// without calibrated intervals.
     #[serde(skip)]
     pub half_width: Option<Vec<f32>>,
-    /// The readings, (32, 32) ADC counts: that of Hadamard row `32 r + c` at (r, c); NaN for a row
+    /// The readings, (n, n): that of Hadamard row `n r + c` at (r, c); NaN for a row
     /// that was not measured.
     #[serde(skip)]
     pub readings: Vec<f32>,
@@ -64,7 +68,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The reconstructed image, (32, 32) in [0, 1], with white at 1.
+    /// The reconstructed image, (n, n) in [0, 1], with white at 1.
     #[cfg(feature = "server")]
     pub fn shares_of_white(&self) -> Vec<f32> {
         let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
@@ -78,6 +82,8 @@ impl Picture {
     pub fn of_counts(number: u64, counts: Vec<f32>, enhanced: Option<Vec<f32>>) -> Self {
         Self {
             number,
+            n: 32,
+            unit: "ADC counts".to_owned(),
             counts,
             enhanced,
             half_width: None,

@@ -99,6 +99,8 @@ pub struct Offer {
     pub models: Vec<&'static str>,
     /// Whether the server was given a folder for recordings.
     pub records: bool,
+    /// Whether the patterns are fixed: those of a feed.
+    pub fixed: bool,
     /// The setup of the command line, whose order can always be shown.
     #[serde(skip)]
     pub base: Option<MeasurementSetup>,
@@ -194,6 +196,9 @@ pub enum ChangeError {
         /// The requested number.
         found: u32,
     },
+    /// The patterns are those of a feed.
+    #[error("{0}: the patterns are those of the feed, expected no order, sampling or sweeps")]
+    Fixed(&'static str),
     /// The server was given no folder for recordings.
     #[error(
         "record: this server was given no folder for recordings; start nirspi serve with --record-to FOLDER"
@@ -292,6 +297,15 @@ impl Settings {
 
 impl Measuring {
     fn with(&self, change: &Change, offer: &Offer) -> Result<Self, ChangeError> {
+        let Change { order, sampling, sweeps, .. } = change;
+        let asked = [
+            ("order", order.is_some()),
+            ("sampling", sampling.is_some()),
+            ("sweeps", sweeps.is_some()),
+        ];
+        if let Some((name, _)) = asked.into_iter().find(|(_, is_asked)| offer.fixed && *is_asked) {
+            return Err(ChangeError::Fixed(name));
+        }
         let sampling = change.sampling.unwrap_or(self.sampling);
         if Sampling::new(sampling).is_err() {
             return Err(ChangeError::Sampling { found: sampling });

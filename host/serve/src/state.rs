@@ -139,14 +139,14 @@ pub struct State<'s> {
 #[derive(Serialize)]
 struct Message<'s> {
     state: &'s State<'s>,
-    /// (32, 32) ADC counts.
+    /// (n, n) in the unit of the picture: 32 and ADC counts for a camera.
     image: Option<String>,
     /// (64, 64) shares of white; `null` if the learned stages are switched off.
     enhanced: Option<String>,
     /// (64, 64) shares of white: half-width of the 95 % interval of each pixel of `enhanced`; `null`
     /// without calibrated intervals.
     interval: Option<String>,
-    /// (32, 32) ADC counts: the reading of Hadamard row `32 r + c` at (r, c); NaN for a row that
+    /// (n, n): the reading of Hadamard row `n r + c` at (r, c); NaN for a row that
     /// was not measured.
     readings: Option<String>,
     /// (32, 32) distances in metres; `null` without a depth sensor.

@@ -1,6 +1,6 @@
 use super::camera_log::Phase;
 use super::light::Leds;
-use super::look::RunSetup;
+use super::look::{RunSetup, Seen};
 use super::settings::Measuring;
 use super::settings::tests::{offer, settings};
 use super::state::Published;
@@ -433,9 +433,7 @@ fn states_come_while_an_image_takes_long() {
     let run = Arc::new(RunSetup { setup: setup(), settling: None, flat_field: None });
     let sum = nirspi::integrate::Integrated::new(&run.setup);
     let look = Look {
-        sum,
-        run,
-        depth: None,
+        seen: Seen::Camera { sum, run, depth: None },
         arrived: Instant::now(),
         counters: Default::default(),
         newest: 1,
@@ -580,8 +578,8 @@ fn images_that_are_given_up_are_counted_and_frames_are_not_waited_for() {
         let sum = nirspi::integrate::Integrated::new(&run.setup);
         offered += 1;
         let (run, arrived) = (Arc::clone(&run), Instant::now());
-        let look =
-            Look { sum, run, depth: None, arrived, counters: Default::default(), newest: offered };
+        let seen = Seen::Camera { sum, run, depth: None };
+        let look = Look { seen, arrived, counters: Default::default(), newest: offered };
         shared.slot.offer(look, Default::default(), Default::default());
         std::thread::sleep(Duration::from_millis(2));
         assert!(began.elapsed() < LIMIT, "{:?}", shared.slot.ledger());

@@ -9,9 +9,11 @@
 use super::camera::{End, EventLog, Live, Next, darken, is_dark, reconnect, why_dark};
 use super::camera_log::{CameraLog, Phase};
 use super::delays::DelayState;
+use super::feed::FeedSource;
 use super::imaging::{Studio, Told};
 use super::light::Leds;
 use super::overload::Shed;
+use super::rest::{RETRY, TICK, rest};
 use super::settings::{Offer, Settings};
 use super::stage::Stage;
 use super::state::Published;
@@ -28,10 +30,6 @@ use std::time::{Duration, Instant};
 use thiserror::Error;
 use tokio::sync::watch;
 
-/// Time between two attempts to reconnect.
-const RETRY: Duration = Duration::from_secs(1);
-/// Time between two checks whether to stop.
-const TICK: Duration = Duration::from_millis(50);
 /// Time between two questions to a camera whose LEDs a person switched off.
 const ASK: Duration = Duration::from_secs(1);
 
@@ -89,10 +87,46 @@ pub fn serve(
     let offer = Offer { records, base: Some(camera.setup.clone()), ..imaging.offer() };
     let stage = Stage::of(camera.scene.take());
     let shared = Arc::new(Shared::new(log, offer, settings, stage));
+    let measure = move |shared: &Arc<Shared>| measure(shared, camera, connected);
+    run(server, shared, imaging, stop, measure)
+}
+
+/// Serves `feed` to the browsers that connect to `server`, until `stop` is set. Returns the account of all frames and
+/// their delays.
+///
+/// # Errors
+/// [`ServeError`].
+pub fn serve_feed(
+    server: Server,
+    feed: FeedSource,
+    imaging: Imaging,
+    settings: Settings,
+    stop: &AtomicBool,
+) -> Result<Served, ServeError> {
+    let log = CameraLog::of_feed(&feed.address);
+    let records = feed.record_to.is_some();
+    let offer = Offer { records, fixed: true, ..imaging.offer() };
+    let shared = Arc::new(Shared::new(log, offer, settings, Stage::of(None)));
+    let made = server.made.clone();
+    let receive = move |shared: &Arc<Shared>| {
+        feed.receive(shared, &made);
+        Ok(())
+    };
+    run(server, shared, imaging, stop, receive)
+}
+
+/// Camera or feed, imaging and HTTP, until `stop` is set.
+fn run(
+    server: Server,
+    shared: Arc<Shared>,
+    imaging: Imaging,
+    stop: &AtomicBool,
+    measure: impl FnOnce(&Arc<Shared>) -> Result<(), CaptureError> + Send + 'static,
+) -> Result<Served, ServeError> {
     let (publish, published) = watch::channel(Arc::new(Published::default()));
     let measuring = {
         let shared = Arc::clone(&shared);
-        spawn("camera", move || measure(&shared, camera, connected))?
+        spawn("camera", move || measure(&shared))?
     };
     let making = {
         let shared = Arc::clone(&shared);
@@ -225,14 +259,6 @@ fn await_person(shared: &Shared, session: &mut Session) {
             is_linked = is_dark(shared, session).is_ok();
             asked = Some(Instant::now());
         }
-        std::thread::sleep(TICK);
-    }
-}
-
-/// Waits for `time`, or until the server stops.
-fn rest(shared: &Shared, time: Duration) {
-    let started = Instant::now();
-    while !shared.is_over() && started.elapsed() < time {
         std::thread::sleep(TICK);
     }
 }

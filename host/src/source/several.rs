@@ -48,19 +48,14 @@ impl<'a> Several<'a> {
     }
 }
 
-/// The most memory for the measurements and images of a whole file.
-const MOST_BYTES: u64 = 4 << 30;
-
-/// Checks that all measurements and their images fit into memory together: for each pattern a row and its
-/// reading, for each pixel the image as it is computed and as it is written.
+/// Checks that all measurements and their images fit into memory together.
 pub(super) fn fits_together(
     path: &Path,
     count: usize,
     patterns: usize,
     side: Side,
 ) -> Result<(), SourceError> {
-    let each = 512 + 24 * patterns as u64 + 12 * side.area() as u64;
-    let most = MOST_BYTES / each;
+    let most = measurement::most_together(patterns, side);
     match count as u64 <= most {
         true => Ok(()),
         false => Err(SourceError::TooMany { path: path.to_owned(), count, most }),

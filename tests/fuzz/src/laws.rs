@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod descriptions;
+pub mod feeds;
 pub mod gateware;
 pub mod measurements;
 pub mod pictures;

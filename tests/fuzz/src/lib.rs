@@ -46,6 +46,7 @@ pub const LAWS: &[&[Law]] = &[
     laws::recordings::LAWS,
     laws::pictures::LAWS,
     laws::descriptions::LAWS,
+    laws::feeds::LAWS,
     laws::weights::LAWS,
     laws::gateware::LAWS,
     laws::service::LAWS,

@@ -27,13 +27,14 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("eval", &["table1", "table2", "table3", "table4", "sampling", "quality"]),
 ];
 
-const ALONE: [&str; 10] = [
+const ALONE: [&str; 11] = [
     "demo",
     "example",
     "serve",
     "reconstruct",
     "inspect",
     "readings",
+    "order",
     "enhance",
     "deblur",
     "metrics",

@@ -5,7 +5,9 @@ use super::readings::{NamedReadings, check_infinite, expected_of, found_names, r
 use super::reference::read_reference;
 use super::rows::{Shown, read_rows, read_side, repeats, shown, side_of_pixels};
 use super::sides::make_pairs;
-use super::{FileError, Form, MeasurementFile, NOISE, Readings, Reference, Remedy, Selection};
+use super::{
+    FileError, Form, MeasurementFile, NOISE, READINGS, Readings, Reference, Remedy, Selection,
+};
 use crate::field::Field;
 use crate::fields::Fields;
 use nirspi_recon::law::{Claim, OVERLOAD};
@@ -32,8 +34,8 @@ pub(super) struct Opened {
 
 /// An open file whose readings are in memory.
 pub(super) struct Loaded<'o> {
-    opened: &'o Opened,
-    numbers: Field,
+    pub(super) opened: &'o Opened,
+    pub(super) numbers: Field,
 }
 
 impl Opened {
@@ -63,7 +65,8 @@ impl Opened {
         let name = readings_field(&fields, want)?;
         let is_d = name == "d";
         let default = if name == "d" { Form::Differences } else { Form::Pairs };
-        let form = want.form.unwrap_or(default);
+        let stated = if name == "y" { stated_form(&mut fields) } else { None };
+        let form = want.form.or(stated).unwrap_or(default);
         let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
         notes.extend(make_pairs(&mut fields, &name, want)?);
         let side_guessed = side.is_none();
@@ -268,8 +271,13 @@ fn mean<P: Iterator<Item = usize>>(
 }
 
 /// Whether a number is a reading, and not a sign that there is none.
-pub(super) fn is_reading(value: f64) -> bool {
+pub(crate) fn is_reading(value: f64) -> bool {
     value.abs() < OVERLOAD
+}
+
+/// The form that the file states for `y`. A field of another kind says nothing.
+fn stated_form(fields: &mut Fields) -> Option<Form> {
+    fields.text(READINGS)?.parse().ok()
 }
 
 /// The noise that the file states for `d`. A field of another kind says nothing.

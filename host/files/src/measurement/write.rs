@@ -11,6 +11,9 @@ use std::path::Path;
 /// The field of an `.npz` file with its provenance, as JSON text.
 pub const PROVENANCE: &str = "provenance";
 
+/// The field of an `.npz` file with the form of `y`, as text.
+pub(crate) const READINGS: &str = "readings";
+
 /// The field with the standard deviation of the noise of `d`, if it is known.
 pub const NOISE: &str = "noise";
 

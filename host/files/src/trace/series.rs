@@ -86,16 +86,18 @@ impl Series {
     }
 
     fn open_raw(path: &Path, raw: Raw, length: u64) -> Result<Self, FileError> {
-        let (descr, bytes, expected) = match raw {
-            Raw::F32 => ("<f4", 4, "32-bit floats, 4 bytes each"),
-            Raw::F64 => ("<f8", 8, "64-bit floats, 8 bytes each"),
-            Raw::I16 => ("<i2", 2, "16-bit integers, 2 bytes each"),
+        let expected = match raw {
+            Raw::F32 => "32-bit floats, 4 bytes each",
+            Raw::F64 => "64-bit floats, 8 bytes each",
+            Raw::I16 => "16-bit integers, 2 bytes each",
+            Raw::I32 => "32-bit integers, 4 bytes each",
         };
+        let bytes = raw.bytes() as u64;
         let wrong = || FileError::kind(path, format!("{length} bytes"), expected);
         if !length.is_multiple_of(bytes) {
             return Err(wrong());
         }
-        let header = Header::of_numbers(descr, length / bytes).map_err(|_| wrong())?;
+        let header = Header::of_numbers(raw.descr(), length / bytes).map_err(|_| wrong())?;
         Ok(Self { path: path.to_owned(), form: Form::Raw(header) })
     }
 

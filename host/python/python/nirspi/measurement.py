@@ -244,7 +244,7 @@ class Measurement:
             Samples at the beginning of each pattern to leave out, while the light settles.
         count : int, optional
             Readings to keep, for a trace that goes on after the last pattern.
-        raw : {"f32", "f64", "i16"}, optional
+        raw : {"f32", "f64", "i16", "i32"}, optional
             The kind of the little-endian numbers of a file without a heading.
         decimal_comma : bool
             Whether every comma of a text file is a decimal comma.

@@ -28,10 +28,16 @@ impl FromStr for Seconds {
 }
 
 impl Seconds {
+    /// Whether so much time is at least as long.
+    #[must_use]
+    pub fn are_over(self, elapsed: Duration) -> bool {
+        elapsed >= self.0
+    }
+
     /// A break if the time is over. A capture that ends so is whole, as if it had all its frames.
     pub fn watch(self, progress: &Progress) -> ControlFlow<StopCause> {
         match progress.waited {
-            Some(_) if progress.elapsed >= self.0 => ControlFlow::Break(StopCause::TimeOver),
+            Some(_) if self.are_over(progress.elapsed) => ControlFlow::Break(StopCause::TimeOver),
             _ => ControlFlow::Continue(()),
         }
     }

@@ -51,6 +51,9 @@ export function show({ settings, offered }) {
   const orders = offered.orders.map(order => order.name), isOther = !orders.includes(settings.order);
   options($("order"), isOther ? [settings.order, ...orders] : orders,
     [...isOther ? ["the order of the command line"] : [], ...offered.orders.map(order => order.about)]);
+  for (const word of ["order", "sampling", "sweep"]) {
+    document.querySelector(`label[data-word=${word}]`).hidden = offered.fixed;
+  }
   $("record").hidden = !offered.records;
   $("no-record").hidden = offered.records;
   if (isTouched()) return;

@@ -1,7 +1,7 @@
 // Draws the images: colour map, range, value under the cursor, warnings.
 
 import { gradient, table } from "./colours.js";
-import { $, explained, fixed, frames, text } from "./dom.js";
+import { $, amount, explained, fixed, foreign, frames, text } from "./dom.js";
 import { answer } from "./speech.js";
 
 export const rates = { drawn: 0 };
@@ -46,7 +46,7 @@ function range(panel, picture) {
 
 // A pattern that was not shown has no reading.
 const inWords = (panel, value) => Number.isNaN(value) ? "not measured"
-  : `${(panel.scale * value).toFixed(panel.digits)} ${panel.unit}`;
+  : `${panel.isAny ? amount(value, panel.digits) : (panel.scale * value).toFixed(panel.digits)} ${panel.unit}`;
 
 function draw(panel, picture) {
   const canvas = $(panel.id), pen = canvas.getContext("2d"), bar = $(`${panel.id}-bar`);
@@ -119,12 +119,17 @@ export function show(message) {
   const isNew = shown?.state.images.shown !== images.shown || shown?.enhanced !== message.enhanced;
   shown = message;
   if (isNew) {
+    // A feed has its own side and unit.
+    const own = { side: picture?.n ?? 32, unit: foreign(picture?.unit ?? ""), isAny: picture?.unit !== "ADC counts" };
+    for (const id of ["readings", "image"]) Object.assign(PANELS[id], own);
+    $("about-image").previousSibling.textContent = `reconstructed, ${own.side} × ${own.side} `;
     for (const panel of Object.values(PANELS)) panel.values = values(message[panel.of]);
     redraw();
   }
   $("no-image").hidden = message.image !== null;
   $("no-enhanced").hidden = message.enhanced !== null;
   text($("no-enhanced"), !settings.enhance ? "switched off"
+    : ![32, 64].includes(picture?.n ?? 32) ? "off: the networks take 32 × 32 and 64 × 64"
     : state.overload.enhancement_off ? "off: this computer is too slow" : "no image yet");
   $("no-readings").hidden = message.readings !== null;
   $("depth-panel").hidden = message.depth === null;

@@ -40,3 +40,9 @@ export function list(element, rows) {
     element.children[2 * at + 1].className = bad ? "loss" : "";
   });
 }
+
+// The name of a camera, or that of the bench whose feed this is.
+export const nameOf = ({ identity, feed, address }) => identity ? `${identity.board} ${identity.serial}` : feed?.name ?? address;
+
+// A number of any size: a unit may be volts or counts.
+export const amount = (value, digits) => value !== 0 && Math.abs(value) < 1 ? value.toPrecision(3) : value.toFixed(digits);

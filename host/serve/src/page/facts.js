@@ -1,6 +1,6 @@
 // The losses of the run, the rates, the estimates, the camera and the events, in words.
 
-import { $, fixed, foreign, list, rate, text, whole } from "./dom.js";
+import { $, amount, fixed, foreign, list, rate, text, whole } from "./dom.js";
 import * as account from "./account.js";
 import { answer } from "./requests.js";
 import { say } from "./speech.js";
@@ -32,15 +32,24 @@ export function show(state, drawnPerSecond) {
     ["blur", found ? `${fixed(found.blur_px, 2)} of 64 px` : "–"],
     ["noise", found ? `${fixed(found.noise, 3)} of white` : "–"],
     ["inconsistency", found ? fixed(found.inconsistency, 2) : "–"],
-    ["white", picture ? `${fixed(picture.white_counts, 1)} ADC counts` : "–"],
+    ["white", picture ? `${amount(picture.white_counts, 1)} ${picture.unit}` : "–"],
   ]);
-  const { identity, measurement } = camera;
+  const { identity, measurement, feed } = camera;
   list($("identity"), [
     ["address", foreign(camera.address)],
     ...camera.versions.map(part => [part.name, foreign(
       part.advice ? `${part.camera}, expected ${part.expected}` : part.camera), part.advice]),
-    ["LEDs", `${identity.wavelength_nm} nm`],
-    ["ADC", `${identity.adc_hz / 1e6} MS/s, ${identity.adc_bits} bit`],
+    ...(identity ? [
+      ["LEDs", `${identity.wavelength_nm} nm`],
+      ["ADC", `${identity.adc_hz / 1e6} MS/s, ${identity.adc_bits} bit`],
+    ] : []),
+    ...(feed ? [
+      ["patterns", `${whole(feed.patterns)}, ${feed.n} × ${feed.n}`],
+      ["order", foreign(feed.order)],
+      ["readings", feed.readings],
+      ["numbers refused", whole(feed.account.refused), feed.account.refused > 0],
+      ["readings not read", whole(feed.account.not_read), feed.account.not_read > 0],
+    ] : []),
     ...(measurement ? [
       ["patterns", `${whole(measurement.patterns)} of ${whole(1024)}`],
       ["order", measurement.order],

@@ -70,6 +70,7 @@ export async function start() {
 const OWN_SPACE = "input, select, textarea, button, a, summary, [contenteditable], [data-keys]";
 
 function pressed(event) {
+  if (document.body.dataset.leds === "none") return;
   if (event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
   const own = event.key === " " && event.target.closest?.(OWN_SPACE);
   if (event.key !== "Escape" && (event.key !== " " || own)) return;
@@ -92,6 +93,8 @@ export function show({ camera, light }) {
   const { leds, phase } = camera;
   offAge = leds === "off" ? camera.leds_age_ms : null;
   document.body.dataset.leds = leds;
+  // A feed: this program switches no LEDs.
+  if (leds === "none") return;
   const isStopping = leds === "on" && !light.allowed, known = isStopping ? "stopping" : leds === "off" && !light.allowed
     ? "LEDs off, stopped" : `LEDs ${foreign(leds)}`;
   if (leds === "unknown") unknown(lastSeen(camera.leds_age_ms), "no answer from the camera");
@@ -119,6 +122,7 @@ export function age(stateAge) {
 
 // There is no state of the last seconds.
 export function showGone(age) {
+  if (document.body.dataset.leds === "none") return;
   document.body.dataset.leds = "unknown";
   unknown(age, GONE.leds);
   $("start").hidden = true;

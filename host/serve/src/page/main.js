@@ -6,7 +6,7 @@ import { GONE, listen } from "./connection.js";
 import * as controls from "./controls.js";
 import * as display from "./display.js";
 import "./explain.js";
-import { $, foreign, text } from "./dom.js";
+import { $, foreign, nameOf, text } from "./dom.js";
 import * as facts from "./facts.js";
 import * as light from "./light.js";
 import * as history from "./history.js";
@@ -33,9 +33,9 @@ function show(message, moment) {
   const { camera } = message.state;
   document.body.dataset.phase = camera.phase;
   says(foreign(camera.line));
-  text($("camera"), foreign(`${camera.identity.board} ${camera.identity.serial}`));
-  document.title = `nirspi ${foreign(camera.identity.serial)}`;
-  text($("wavelength"), String(camera.identity.wavelength_nm));
+  text($("camera"), foreign(nameOf(camera)));
+  document.title = `nirspi ${foreign(camera.identity?.serial ?? nameOf(camera))}`;
+  text($("wavelength"), String(camera.identity?.wavelength_nm ?? ""));
   $("simulated").hidden = !camera.simulated;
   $("fault").hidden = camera.phase !== "fault";
   $("uncalibrated").hidden = camera.phase !== "uncalibrated";
@@ -58,7 +58,7 @@ $("save").onclick = () => {
 $("save-npy").onclick = () => {
   const shown = display.onScreen();
   if (!shown?.image) return;
-  download(npy(display.values(shown.image), 32), "image.npy");
+  download(npy(display.values(shown.image), shown.state.picture.n), "image.npy");
   if (shown.enhanced) download(npy(display.values(shown.enhanced), 64), "enhanced.npy");
 };
 

@@ -1,6 +1,6 @@
 // Small plots of the last two minutes: rates, delay, losses, signal, signal-to-noise ratio.
 
-import { $, rate, text } from "./dom.js";
+import { $, amount, rate, text } from "./dom.js";
 
 const EVERY_MS = 500, KEPT = 240;
 
@@ -10,7 +10,7 @@ const PLOTS = [
   { id: "delay-plot", name: "delay, p99, ms", words: n => n.toFixed(n < 10 ? 1 : 0), value: ({ delays }) =>
     (delays.sent ?? delays.enhanced ?? delays.reconstructed)?.p99_ms },
   { id: "losses-plot", name: "frames not received", words: rate, bars: true, value: lossesSinceLast },
-  { id: "signal-plot", name: "signal, ADC counts", words: n => n.toFixed(1), value: state => state.picture?.white_counts },
+  { id: "signal-plot", name: "signal", words: n => amount(n, 1), value: state => state.picture?.white_counts },
   { id: "snr-plot", name: "signal to noise", words: n => n.toFixed(1), value: ({ picture }) =>
     picture?.enhancement?.noise > 0 ? 1 / picture.enhancement.noise : undefined },
 ];

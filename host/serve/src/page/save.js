@@ -1,6 +1,6 @@
 // Saves what the page shows.
 
-import { $, fixed, foreign, frames } from "./dom.js";
+import { $, amount, fixed, foreign, frames, nameOf } from "./dom.js";
 
 // What a picture is, for whoever finds it later: the picture's own time, measurement, losses and warnings, not those of the moment
 // at which it is saved.
@@ -10,9 +10,9 @@ function about({ camera, picture, scene }) {
   const before = scene ? `, scene ${foreign(scene.name)}, ${fixed(scene.distance_m, 2)} m, ${foreign(scene.weather)}` : "";
   const recursive = picture.past === null ? "" : ", recursive";
   return [
-    `${is}${foreign(camera.identity.board)} ${foreign(camera.identity.serial)}, ${at}${before}`,
-    `${foreign(picture.order)} order, ${picture.patterns} of 1024 patterns, sweeps in a frame: ${picture.sweeps}, ${frames(picture.frames)}`,
-    `${picture.method}${recursive}, white ${fixed(picture.white_counts, 1)} ADC counts` + (found
+    `${is}${foreign(nameOf(camera))}, ${at}${before}`,
+    `${foreign(picture.order)} order, ${picture.patterns} of ${picture.n ** 2} patterns, sweeps in a frame: ${picture.sweeps}, ${frames(picture.frames)}`,
+    `${picture.method}${recursive}, white ${amount(picture.white_counts, 1)} ${foreign(picture.unit)}` + (found
       ? `; enlarged and deblurred: blur ${fixed(found.blur_px, 2)} px, noise ${fixed(found.noise, 3)} of white` : ""),
     `this run: ${run.received} received, ${run.lost} lost, ${run.corrupt} corrupt, ${run.late} late`,
     ...picture.warnings.map(warning => `warning: ${foreign(warning)}`),

@@ -1,6 +1,5 @@
 use super::*;
 use crate::lock;
-use crate::look::Look;
 use crate::overload::tests::given_up;
 use data_encoding::BASE64;
 use nirspi_recon::Measurements;
@@ -93,9 +92,7 @@ fn watched(page: &mut Turns, turns: usize) -> Vec<(Value, Measurements)> {
         let published = lock(&page.studio.told()).state(&page.shared).unwrap();
         if shown(page) > before {
             let message = serde_json::from_str(&published.message).unwrap();
-            let Look { sum, run, .. } = look;
-            let frames = sum.measurements(&run.setup, run.settling.as_ref(), false).unwrap();
-            made.push((message, frames));
+            made.push((message, look.measured().unwrap().measurements));
         }
     }
     made

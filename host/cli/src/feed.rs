@@ -1,0 +1,114 @@
+//! Feeds, the live readings of any bench: `nirspi capture --camera feed:ADDR`.
+
+use super::progress::Progress;
+use super::report::ReportArgs;
+use super::{Usage, print, provenance, settings};
+use anyhow::{Result, bail};
+use nirspi::capture::{FeedProgress, FeedReport, Seconds, StopCause, record_feed};
+use nirspi::files::feed::{Address, Feed, FeedError, Recorder};
+use nirspi::files::interrupt;
+use nirspi::files::output::Existing;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+
+/// Options of every command that reads a feed.
+const EVERYWHERE: [&str; 7] =
+    ["camera", "json", "quiet", "strict", "verbose", "settings", "save-settings"];
+
+/// A capture of a feed.
+pub struct Capture<'a> {
+    pub address: &'a Address,
+    pub frames: Option<u32>,
+    pub seconds: Option<Seconds>,
+    pub out: Option<&'a Path>,
+    pub overwrite: bool,
+    pub report: ReportArgs,
+}
+
+pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
+    let Capture { address, frames, seconds, out, overwrite, report } = *args;
+    refuse_others(&["frames", "seconds", "out", "overwrite"])?;
+    let out = match out {
+        Some(out) if out.extension().is_none_or(|extension| extension != "npz") => {
+            let out = out.display();
+            return Err(Usage(format!("--out {out}: expected a name that ends in .npz")).into());
+        }
+        Some(out) => out.to_owned(),
+        None => Recorder::first_free(Path::new("")),
+    };
+    Existing::of(overwrite, None).check(&out)?;
+    let stop = interrupt::stop_flag();
+    let frames = frames.map(u64::from);
+    let bar = Progress::new("capture", frames, "frames");
+    bar.say("waiting for the header");
+    let opened = Feed::open(address, || !stop.load(Ordering::Relaxed));
+    let mut feed = match opened {
+        Err(FeedError::Stopped(_)) => bail!("{address}: stopped before the header came"),
+        opened => opened?,
+    };
+    let provenance = feed.header().taken(address).made(provenance::made());
+    let recorder = Recorder::begin(&out, overwrite, feed.header(), &provenance)?;
+    let watch = |progress: &FeedProgress<'_>| {
+        bar.set(progress.account.frames);
+        bar.say(match progress.quiet {
+            Some(quiet) if quiet.as_secs() > 0 => format!("no data for {} s", quiet.as_secs()),
+            _ => progress.account.to_string(),
+        });
+        match stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(StopCause::of_program()),
+            false => ControlFlow::Continue(()),
+        }
+    };
+    let recorded = record_feed(&mut feed, recorder, frames, seconds, watch)?;
+    drop(bar);
+    report.print(&recorded, &provenance, |recorded| say(address, recorded))?;
+    match &recorded.missing {
+        None => Ok(ExitCode::SUCCESS),
+        Some(missing) => {
+            print::complain(format_args!("{address}: {missing}"));
+            Ok(ExitCode::FAILURE)
+        }
+    }
+}
+
+/// Whether the user has given this option on the command line.
+pub fn is_given(name: &str) -> bool {
+    settings::given().iter().any(|given| given == name)
+}
+
+/// Refuses options for cameras, all but these.
+pub fn refuse_others(known: &[&str]) -> Result<()> {
+    let mut given = settings::given().iter().map(String::as_str);
+    match given.find(|name| !known.contains(name) && !EVERYWHERE.contains(name)) {
+        None => Ok(()),
+        Some(other) => {
+            let why = "a feed says in its header what is measured";
+            Err(Usage(format!("--{other} does not go with --camera feed:ADDR: {why}")).into())
+        }
+    }
+}
+
+fn say(address: &Address, report: &FeedReport) -> Result<()> {
+    let FeedReport { n, order, readings, account, ended, seconds, readings_per_s, .. } = report;
+    let name = report.name.clone().unwrap_or_else(|| address.to_string());
+    print::line(format_args!("{name}: {n} x {n}, order {order}, readings {readings}"))?;
+    print::line(format_args!("{account}; {ended}"))?;
+    print::line(format_args!("{readings_per_s:.0} readings/s over {seconds:.2} s"))?;
+    match &report.files[..] {
+        [] => Ok(()),
+        [file, others @ ..] => {
+            let files: Vec<String> =
+                report.files.iter().map(|file| file.display().to_string()).collect();
+            let open = match others {
+                [] => format!("{} --index all", file.display()),
+                _ => files.join(" "),
+            };
+            print::line(format_args!(
+                "wrote {}; nirspi reconstruct {open} makes images",
+                files.join(", ")
+            ))
+        }
+    }
+}

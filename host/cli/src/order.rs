@@ -1,0 +1,74 @@
+//! `nirspi order`: the patterns of an order as files, for a DMD.
+
+use super::camera::parse_order;
+use super::report::words;
+use super::{Usage, print, provenance};
+use anyhow::Result;
+use nirspi::files::measurement::Form;
+use nirspi::patterns::{PatternSet, PatternsError};
+use nirspi_recon::{Order, Side};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Write the patterns of an order as pictures or as one array, for a DMD or another projector
+///
+/// The command writes a picture for each pattern and each complement, 1 bit a pixel, in the order in which they are shown:
+/// 00000.png, 00001.png and so on. With --npy it writes patterns.npy instead, (M, n, n / 8), 8 pixels a byte, for
+/// numpy.unpackbits. Beside them are order.txt, for --shown table:order.txt, and header.json, the first line of a feed of
+/// readings under these patterns (docs/feeds.md).
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n\
+    \x20 nirspi order zig-zag --n 64 --out patterns/\n\
+    \x20 nirspi order cake-cutting --n 32 --patterns 300 --scale 24 --out patterns/")]
+pub struct Args {
+    #[arg(value_name = "ORDER", help = order_help())]
+    order: String,
+    /// Side of the image: a power of two from 2 to 256
+    #[arg(long, value_name = "N", default_value_t = 32)]
+    n: u64,
+    /// Number of patterns, the first of the order [default: all]
+    #[arg(long, value_name = "M")]
+    patterns: Option<usize>,
+    /// How complements follow patterns: pairs, halves, or single for none
+    #[arg(long, value_name = "FORM", default_value = Form::Pairs.name(),
+          value_parser = words(&Form::ALL, |form| (form.name(), form.about())))]
+    readings: Form,
+    /// Pixels of a picture along each side of a pixel of the pattern
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
+    scale: u32,
+    /// Write one array, patterns.npy, instead of pictures
+    #[arg(long, conflicts_with = "scale")]
+    npy: bool,
+    /// Folder for the files
+    #[arg(long, value_name = "DIR", default_value = "patterns")]
+    out: PathBuf,
+}
+
+fn order_help() -> String {
+    format!("The order: {}, or table:FILE", Order::expected())
+}
+
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let side = Side::new(args.n).map_err(|error| Usage(format!("--n: {error}")))?;
+    let set = PatternSet {
+        order: parse_order("ORDER", &args.order)?,
+        side,
+        patterns: args.patterns,
+        form: args.readings,
+        scale: args.scale,
+        one_array: args.npy,
+    };
+    let written = set.write(&args.out, provenance::made()).map_err(|error| match error {
+        error @ (PatternsError::Count { .. } | PatternsError::Differences) => {
+            Usage(error.to_string()).into()
+        }
+        error => anyhow::Error::from(error),
+    })?;
+    let what = if args.npy { "patterns.npy" } else { "pictures" };
+    print::line(format_args!(
+        "wrote {} patterns and complements ({what}), order.txt and header.json to {}",
+        written.shown,
+        args.out.display()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,32 @@
+//! Live readings of any bench: a header, then numbers for ever.
+//!
+//! A feed is a stream of bytes at an [`Address`]: a TCP connection, a Unix socket, a pipe, a file that grows, or the
+//! standard input. Its first line is the [`Header`], one JSON object that says which patterns are shown and what the
+//! numbers are. The numbers follow as text or as little-endian bytes. One sweep of the header's patterns is one frame;
+//! [`Sweeps`](super::measurement::Sweeps) makes of each what a measurement file with the same numbers gives, and
+//! [`Recorder`] writes frames as measurement files.
+//!
+//! ```text
+//! {"n": 64, "order": "zig-zag", "readings": "pairs", "numbers": "f32", "name": "DMD of room 3"}
+//! ```
+//!
+//! # Invariant
+//! Every number of a feed has its place in one frame, or is counted in the [`Account`]
+//! (`frames::tests::every_number_has_its_place_however_the_bytes_are_cut`). A number that is no number takes the place of a
+//! reading that was not read, so that the readings after it keep their patterns
+//! (`frames::tests::a_word_takes_the_place_of_one_reading`). A feed can send anything, and takes memory for one header, one frame
+//! and a few blocks at most (`stream::tests::a_header_without_end_is_refused_before_it_fills_the_memory`).
+
+mod account;
+mod address;
+mod frames;
+mod header;
+mod record;
+mod stream;
+
+pub use account::Account;
+pub use address::{Address, AddressError};
+pub use frames::{Frames, SecondHeader, Taken};
+pub use header::{Header, HeaderError, Numbers, Samples};
+pub use record::{Recorded, Recorder};
+pub use stream::{End, Feed, FeedError, MAX_HEADER_BYTES, Next};

@@ -1,0 +1,299 @@
+//! The first line of a feed: one JSON object.
+
+use super::address::Address;
+use crate::error::Shown;
+use crate::provenance::{Origin, Taken};
+use crate::trace::Raw;
+use nirspi_recon::law::Form;
+use nirspi_recon::{Order, Side};
+use serde::Deserialize;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// A header, for error messages.
+const EXAMPLE: &str = r#"{"n": 64, "order": "zig-zag", "readings": "pairs", "numbers": "f32"}"#;
+
+/// The most patterns of a frame: 16 sweeps of 256 x 256.
+const MAX_PATTERNS: usize = 1 << 20;
+
+/// The most samples of a reading.
+const MAX_SAMPLES: u32 = 1 << 20;
+
+/// What a feed says of its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Side of the image.
+    pub side: Side,
+    /// The row of the natural-order Hadamard matrix that is shown k-th in each frame. A row may be shown several times.
+    pub rows: Vec<u32>,
+    /// How readings belong to patterns.
+    pub form: Form,
+    /// What the numbers are.
+    pub numbers: Numbers,
+    /// How many numbers make a reading.
+    pub samples: Samples,
+    /// The unit of the readings.
+    pub unit: Option<String>,
+    /// The name of the bench.
+    pub name: Option<String>,
+    /// Whether no real light is measured; `None` if the header does not say.
+    pub simulated: Option<bool>,
+}
+
+/// What the numbers of a feed are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Numbers {
+    /// Text with blanks or line ends between numbers.
+    Text,
+    /// Little-endian bytes without anything between numbers.
+    Binary(Raw),
+}
+
+/// How many numbers of a feed make a reading: their mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Samples {
+    /// Numbers of a reading, at least 1.
+    pub each: u32,
+    /// Numbers at the beginning of each reading that its mean leaves out; fewer than `each`.
+    pub settle: u32,
+}
+
+/// Why a line is no header. `Display` is one line.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("the header {}, expected {}", Shown::text(.found), .expected)]
+pub struct HeaderError {
+    /// What was found, as the rest of a sentence.
+    pub found: String,
+    /// What was expected.
+    pub expected: String,
+}
+
+impl HeaderError {
+    pub(super) fn new(found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self { found: found.into(), expected: expected.into() }
+    }
+
+    /// A line that is no header at all.
+    pub(super) fn no_header(found: impl Into<String>) -> Self {
+        Self::new(found, format!("one JSON line such as {EXAMPLE}"))
+    }
+}
+
+/// The header as its sender writes it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stated {
+    n: u64,
+    order: Option<String>,
+    patterns: Option<usize>,
+    h_row: Option<Vec<u32>>,
+    readings: String,
+    numbers: Option<String>,
+    samples: Option<u32>,
+    settle: Option<u32>,
+    unit: Option<String>,
+    name: Option<String>,
+    simulated: Option<bool>,
+}
+
+impl FromStr for Numbers {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "text" => Ok(Self::Text),
+            word => word
+                .parse()
+                .map(Self::Binary)
+                .map_err(|_| format!("text, {}", Raw::ALL.map(Raw::name).join(", "))),
+        }
+    }
+}
+
+impl FromStr for Header {
+    type Err = HeaderError;
+
+    fn from_str(line: &str) -> Result<Self, HeaderError> {
+        let stated: Stated = serde_json::from_str(line)
+            .map_err(|error| HeaderError::no_header(format!("is no JSON of a feed ({error})")))?;
+        let says = |key: &str, value: &str| format!("says \"{key}\": {value}");
+        let text = |key: &str, value: &str| format!("says \"{key}\": {value:?}");
+        let side = Side::new(stated.n).map_err(|_| {
+            HeaderError::new(says("n", &stated.n.to_string()), "a power of two from 2 to 256")
+        })?;
+        let form: Form = stated.readings.parse().map_err(|_| {
+            let expected = Form::ALL.map(Form::name).join(", ");
+            HeaderError::new(text("readings", &stated.readings), expected)
+        })?;
+        let numbers = match &stated.numbers {
+            None => Numbers::Text,
+            Some(word) => word
+                .parse()
+                .map_err(|expected: String| HeaderError::new(text("numbers", word), expected))?,
+        };
+        let each = stated.samples.unwrap_or(1);
+        if !(1..=MAX_SAMPLES).contains(&each) {
+            let expected = format!("1 to {MAX_SAMPLES} samples of a reading");
+            return Err(HeaderError::new(says("samples", &each.to_string()), expected));
+        }
+        let settle = stated.settle.unwrap_or(0);
+        if settle >= each {
+            let expected = format!("fewer than the {each} samples of a reading");
+            return Err(HeaderError::new(says("settle", &settle.to_string()), expected));
+        }
+        let rows = stated.rows(side)?;
+        let Stated { unit, name, simulated, .. } = stated;
+        let samples = Samples { each, settle };
+        Ok(Self { side, rows, form, numbers, samples, unit, name, simulated })
+    }
+}
+
+impl Stated {
+    /// The rows that are shown, in their order.
+    fn rows(&self, side: Side) -> Result<Vec<u32>, HeaderError> {
+        let area = side.area();
+        match (&self.order, &self.h_row) {
+            (Some(name), None) => {
+                let order: Order = name.parse().map_err(|_| {
+                    let expected = format!("one of {}; or h_row", Order::expected());
+                    HeaderError::new(format!("says \"order\": {name:?}"), expected)
+                })?;
+                let count = self.patterns.unwrap_or(area);
+                if !(1..=area).contains(&count) {
+                    let expected = format!("1 to {area} patterns for n = {}", side.pixels());
+                    return Err(HeaderError::new(format!("says \"patterns\": {count}"), expected));
+                }
+                let rows = order.rows(side).map_err(|error| {
+                    HeaderError::new(format!("says \"order\": {name:?} ({error})"), "an order")
+                })?;
+                Ok(rows[..count].to_vec())
+            }
+            (None, Some(rows)) => {
+                if let Some(count) = self.patterns.filter(|&count| count != rows.len()) {
+                    let found = format!("says \"patterns\": {count}");
+                    let expected =
+                        format!("{}, as many as h_row has, or no \"patterns\"", rows.len());
+                    return Err(HeaderError::new(found, expected));
+                }
+                if rows.is_empty() || rows.len() > MAX_PATTERNS {
+                    let found = format!("has an h_row of {} entries", rows.len());
+                    return Err(HeaderError::new(found, format!("1 to {MAX_PATTERNS}")));
+                }
+                match rows.iter().position(|&row| row as usize >= area) {
+                    None => Ok(rows.clone()),
+                    Some(at) => {
+                        let found = format!("has {} at [{at}] of h_row", rows[at]);
+                        let n = side.pixels();
+                        Err(HeaderError::new(found, format!("0 to {} for n = {n}", area - 1)))
+                    }
+                }
+            }
+            (Some(_), Some(_)) => {
+                Err(HeaderError::new("has both \"order\" and \"h_row\"", "one of the two"))
+            }
+            (None, None) => Err(HeaderError::new(
+                "has neither \"order\" nor \"h_row\"",
+                "the order in which patterns are shown",
+            )),
+        }
+    }
+}
+
+impl Header {
+    /// Number of readings of a frame.
+    #[must_use]
+    pub fn readings(&self) -> usize {
+        self.rows.len() * self.form.readings()
+    }
+
+    /// The order of the patterns, in words: its name, or `h_row`.
+    #[must_use]
+    pub fn order(&self) -> String {
+        Order::of(&self.rows, self.side)
+            .map_or_else(|| "h_row".to_owned(), |order| order.to_string())
+    }
+
+    /// Where readings of a feed with this header come from.
+    #[must_use]
+    pub fn taken(&self, address: &Address) -> Taken {
+        let origin = match self.simulated {
+            Some(true) => Origin::Simulated,
+            Some(false) => Origin::Measured,
+            None => Origin::Unknown,
+        };
+        let name = self.name.clone().unwrap_or_else(|| address.to_string());
+        Taken { origin, camera: None, file: Some(name) }
+    }
+
+    /// The type of a recorded reading, as NumPy writes it. A mean of samples is no integer.
+    pub(super) fn recorded(&self) -> Raw {
+        match self.numbers {
+            Numbers::Binary(raw) if self.samples.each == 1 => raw,
+            _ => Raw::F64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(line: &str) -> String {
+        let line = line.parse::<Header>().unwrap_err().to_string();
+        assert_eq!(line.lines().count(), 1, "{line}");
+        line
+    }
+
+    #[test]
+    fn a_header_says_the_patterns_and_the_numbers() {
+        let header: Header = EXAMPLE.parse().unwrap();
+        assert_eq!((header.side.pixels(), header.readings()), (64, 2 * 64 * 64));
+        assert_eq!(header.rows, *Order::ZigZag.rows(header.side).unwrap());
+        assert_eq!(header.numbers, Numbers::Binary(Raw::F32));
+        assert_eq!((header.samples.each, header.order()), (1, "zig-zag".to_owned()));
+        let own = r#"{"n":2,"h_row":[0,3,3],"readings":"single","samples":20,"settle":4,"unit":"V","name":"a","simulated":true}"#;
+        let header: Header = own.parse().unwrap();
+        assert_eq!((&*header.rows, header.readings()), (&[0, 3, 3][..], 3));
+        assert_eq!(header.samples, Samples { each: 20, settle: 4 });
+        assert_eq!((header.numbers, header.recorded()), (Numbers::Text, Raw::F64));
+        assert_eq!((header.unit.as_deref(), header.simulated), (Some("V"), Some(true)));
+        let part: Header =
+            r#"{"n":4,"order":"natural","patterns":3,"readings":"halves"}"#.parse().unwrap();
+        assert_eq!((&*part.rows, part.readings()), (&[0, 1, 2][..], 6));
+    }
+
+    #[test]
+    fn what_is_no_header_is_refused_in_one_line_that_names_it() {
+        let order = r#""order":"natural","readings":"single""#;
+        for (line, found) in [
+            ("hello".to_owned(), "is no JSON of a feed"),
+            (format!("{{{order}}}"), "missing field `n`"),
+            (format!("{{\"n\":3,{order}}}"), "\"n\": 3, expected a power of two from 2 to 256"),
+            (
+                format!("{{\"n\":4,{order},\"gain\":3}}"),
+                "unknown field `gain`, expected one of `n`",
+            ),
+            (format!("{{\"n\":4,{order},\"n\":4}}"), "duplicate field `n`"),
+            (format!("{{\"n\":4,{order},\"patterns\":17}}"), "1 to 16 patterns for n = 4"),
+            (
+                format!("{{\"n\":4,{order},\"numbers\":\"f16\"}}"),
+                "expected text, f32, f64, i16, i32",
+            ),
+            (format!("{{\"n\":4,{order},\"samples\":0}}"), "\"samples\": 0, expected 1 to 1048576"),
+            (format!("{{\"n\":4,{order},\"settle\":1}}"), "fewer than the 1 samples"),
+            (format!("{{\"n\":4,{order},\"h_row\":[0]}}"), "both \"order\" and \"h_row\""),
+            (r#"{"n":4,"readings":"single"}"#.into(), "neither \"order\" nor \"h_row\""),
+            (r#"{"n":4,"order":"a\nb","readings":"single"}"#.into(), "expected one of natural"),
+            (r#"{"n":4,"order":"natural","readings":"triples"}"#.into(), "expected pairs, halves"),
+            (r#"{"n":4,"h_row":[0,16],"readings":"single"}"#.into(), "16 at [1] of h_row"),
+            (r#"{"n":4,"h_row":[],"readings":"single"}"#.into(), "an h_row of 0 entries"),
+            (
+                r#"{"n":4,"h_row":[0],"patterns":2,"readings":"single"}"#.into(),
+                "as many as h_row has",
+            ),
+        ] {
+            let told = refused(&line);
+            assert!(told.contains(found), "{line}: {told}");
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! The feed of a page: receives every frame of a bench that is no camera of nirspi, and puts the newest into the slot.
+
+use super::camera_log::Phase;
+use super::delays::Passed;
+use super::light::Leds;
+use super::look::{Bench, Look, Seen};
+use super::rest::{RETRY, rest};
+use super::{ForeignError, Shared, lock};
+use nirspi::account::LossCounters;
+use nirspi::causes;
+use nirspi::clock::Instant;
+use nirspi::events::Level;
+use nirspi::files::FileError;
+use nirspi::files::feed::{Account, Address, Feed, Header, Next, Recorded, Recorder};
+use nirspi::files::measurement::Sweeps;
+use nirspi::provenance::Made;
+use nirspi_recon::words::count;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Time between two looks at what pages want.
+const TICK: Duration = Duration::from_millis(100);
+/// A feed that sends nothing for so long is called silent.
+const SILENT: Duration = Duration::from_secs(2);
+/// The most bytes of readings that are kept for a sum of frames.
+const MOST_KEPT: usize = 256 << 20;
+
+/// A feed whose header has come.
+pub struct FeedSource {
+    /// The address, to open the feed again.
+    pub address: Address,
+    /// The feed.
+    pub feed: Feed,
+    /// The folder for recordings; `None` if pages cannot record.
+    pub record_to: Option<PathBuf>,
+}
+
+impl FeedSource {
+    /// Receives until the server stops. A feed that has ended is opened again, but for the standard input, which has no
+    /// other.
+    pub(super) fn receive(self, shared: &Arc<Shared>, made: &Made) {
+        let Self { address, feed, record_to } = self;
+        let mut receiver = Receiver {
+            shared,
+            address: &address,
+            made,
+            record_to,
+            earlier: LossCounters::default(),
+            offered: 0,
+            recorder: None,
+        };
+        let mut next = Some(feed);
+        while !shared.is_over() {
+            let feed = match next.take() {
+                Some(feed) => Ok(feed),
+                None => Feed::open(&address, || !shared.is_over()),
+            };
+            let why = match feed {
+                Ok(feed) => receiver.one(feed),
+                Err(error) => causes::in_one_line(&error),
+            };
+            if shared.is_over() {
+                return;
+            }
+            if address == Address::Stdin {
+                shared.enter(Phase::Lost, Leds::None, why);
+                while !shared.is_over() {
+                    rest(shared, RETRY);
+                }
+                return;
+            }
+            shared.enter(Phase::Lost, Leds::None, format!("{why}; trying again"));
+            rest(shared, RETRY);
+        }
+    }
+}
+
+/// Receives one feed after the other from an address.
+struct Receiver<'r> {
+    shared: &'r Shared,
+    address: &'r Address,
+    made: &'r Made,
+    record_to: Option<PathBuf>,
+    /// The account of all earlier feeds.
+    earlier: LossCounters,
+    /// Frames put into the slot.
+    offered: u64,
+    recorder: Option<Recorder>,
+}
+
+impl Receiver<'_> {
+    /// Receives a feed to its end. Returns why it ended, in one line.
+    fn one(&mut self, mut feed: Feed) -> String {
+        let why = match self.frames(&mut feed) {
+            Ok(why) => why,
+            Err(error) => causes::in_one_line(&*error),
+        };
+        self.end_recording();
+        let run = counters(feed.account(), true);
+        self.tell(feed.account(), run);
+        self.earlier = self.earlier + run;
+        lock(&self.shared.camera).event(Level::Warning, why.clone());
+        why
+    }
+
+    fn frames(&mut self, feed: &mut Feed) -> Result<String, ForeignError> {
+        let header = feed.header().clone();
+        let bench = Arc::new(self.bench(&header)?);
+        lock(&self.shared.camera).fed(&header, header.taken(self.address));
+        let mut kept: VecDeque<Arc<[f64]>> = VecDeque::new();
+        let most = (MOST_KEPT / (8 * header.readings())).max(1);
+        let mut told = Instant::now();
+        let mut silent = None;
+        while !self.shared.is_over() {
+            match feed.next(TICK) {
+                Next::Frame(readings) => {
+                    if let Some(recorder) = &mut self.recorder {
+                        let pushed = recorder.push(readings);
+                        self.unless_failed(pushed);
+                    }
+                    let sum = lock(&self.shared.settings).frames as usize;
+                    kept.push_back(readings.into());
+                    while kept.len() > sum.min(most) {
+                        kept.pop_front();
+                    }
+                    self.offer(&kept, &bench, feed.account());
+                    if self.offered == 1 || silent.take().is_some() {
+                        self.shared.enter(Phase::Measuring, Leds::None, "measuring".to_owned());
+                    }
+                }
+                Next::Quiet(quiet) if quiet >= SILENT => {
+                    let seconds = quiet.as_secs();
+                    if silent.replace(seconds) != Some(seconds) {
+                        let line = format!("no data for {seconds} s");
+                        self.shared.enter(Phase::Silent, Leds::None, line);
+                    }
+                }
+                Next::Quiet(_) => {
+                    if silent.take().is_some() {
+                        self.shared.enter(Phase::Measuring, Leds::None, "measuring".to_owned());
+                    }
+                }
+                Next::End(end) => return Ok(end.to_string()),
+            }
+            if told.elapsed() >= TICK {
+                told = Instant::now();
+                self.tell(feed.account(), counters(feed.account(), false));
+                self.record(&header);
+            }
+        }
+        Ok("the server stops".to_owned())
+    }
+
+    fn bench(&self, header: &Header) -> Result<Bench, FileError> {
+        let origin = PathBuf::from(self.address.to_string());
+        let (side, rows) = (header.side, &header.rows);
+        let sweeps = Sweeps::new(&origin, side, rows, header.form, header.simulated)?;
+        Ok(Bench { header: header.clone(), origin, sweeps })
+    }
+
+    fn offer(&mut self, kept: &VecDeque<Arc<[f64]>>, bench: &Arc<Bench>, account: &Account) {
+        let arrived = Instant::now();
+        let counters = counters(account, false);
+        self.offered += 1;
+        let seen = Seen::Feed { frames: kept.iter().cloned().collect(), bench: Arc::clone(bench) };
+        self.shared.passed(Passed::Counted, arrived);
+        let look = Look { seen, arrived, counters, newest: self.offered };
+        self.shared.slot.offer(look, self.earlier, counters);
+    }
+
+    /// Tells pages the account. The first number that is refused is an event.
+    fn tell(&self, account: &Account, run: LossCounters) {
+        self.shared.slot.account(self.earlier, run);
+        let mut log = lock(&self.shared.camera);
+        let Some(feed) = &mut log.camera.feed else { return };
+        let is_first = feed.account.refused == 0 && account.refused > 0;
+        feed.account.clone_from(account);
+        if is_first {
+            let first = account.first_refused.clone().unwrap_or_default();
+            let line = format!("a number was refused: {first}; the next are only counted");
+            log.event(Level::Warning, line);
+        }
+    }
+
+    /// Begins or ends a recording, as pages want.
+    fn record(&mut self, header: &Header) {
+        let wanted = lock(&self.shared.settings).record;
+        match (&self.record_to, wanted, self.recorder.is_some()) {
+            (Some(folder), true, false) => {
+                let provenance = header.taken(self.address).made(self.made);
+                let path = Recorder::first_free(folder);
+                match Recorder::begin(&path, false, header, &provenance) {
+                    Ok(recorder) => self.recorder = Some(recorder),
+                    Err(error) => self.unless_failed(Err(error)),
+                }
+            }
+            (_, false, true) => self.end_recording(),
+            _ => {}
+        }
+    }
+
+    /// Ends a recording, if there is one. A person must begin another one.
+    fn end_recording(&mut self) {
+        let Some(recorder) = self.recorder.take() else { return };
+        lock(&self.shared.settings).record = false;
+        match recorder.finish() {
+            Ok(Recorded { files, frames }) => {
+                let name = |file: &PathBuf| {
+                    let name = file.file_name().unwrap_or(file.as_os_str());
+                    Path::new(name).display().to_string()
+                };
+                let names: Vec<String> = files.iter().map(name).collect();
+                let names = if names.is_empty() { "no file".to_owned() } else { names.join(", ") };
+                let line = format!("recorded {} in {names}", count(frames, "frame"));
+                lock(&self.shared.camera).event(Level::Info, line);
+            }
+            Err(error) => self.unless_failed(Err(error)),
+        }
+    }
+
+    /// A recording that fails is an event, and ends.
+    fn unless_failed(&mut self, done: Result<(), FileError>) {
+        if let Err(error) = done {
+            self.recorder = None;
+            lock(&self.shared.settings).record = false;
+            lock(&self.shared.camera).event(Level::Error, causes::in_one_line(&error));
+        }
+    }
+}
+
+/// The account of frames. A frame without any reading counts as corrupt, and at the end of a feed so does one that is cut.
+fn counters(account: &Account, is_end: bool) -> LossCounters {
+    let cut = u64::from(is_end && account.cut > 0);
+    LossCounters {
+        received: account.frames,
+        corrupt: account.empty_frames + cut,
+        ..LossCounters::default()
+    }
+}
