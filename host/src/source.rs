@@ -26,6 +26,7 @@ mod moving;
 mod recording;
 mod several;
 
+pub use moving::measurements as followed;
 pub(crate) use recording::of_sum;
 use recording::{frames_of_recording, from_recording};
 pub use several::Several;

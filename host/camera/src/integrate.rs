@@ -318,10 +318,17 @@ impl Newest {
         self.frames.push_back((frame.sequence.into(), Arc::new(alone)));
     }
 
+    /// A sum that was made elsewhere, in the place of one frame.
+    #[must_use]
+    pub fn of_sum(sum: Integrated) -> Self {
+        let frames = VecDeque::from([(0, Arc::new(sum.clone()))]);
+        Self { frames, total: sum, before: None, alternating: false }
+    }
+
     /// Number of frames.
     #[must_use]
     pub fn frames(&self) -> u64 {
-        self.frames.len() as u64
+        self.total.frames
     }
 
     /// The sum of the frames. Its noise is known from two frames of the run on, also where it is a sum of one, and so is
@@ -331,6 +338,9 @@ impl Newest {
         let frames = || self.frames.iter().map(|(_, frame)| frame);
         // Flags cannot be subtracted, so they are collected anew.
         let flags = frames().fold(FrameFlags::default(), |all, frame| all.with(frame.flags));
+        if self.before.is_none() && self.frames.len() <= 1 {
+            return Integrated { flags, ..self.total.clone() };
+        }
         let (mut spread, mut changes) = (Spread::default(), Changes::default());
         for frame in self.before.iter().chain(frames()) {
             spread.add(frame.sums.iter().copied(), frame.sweeps);

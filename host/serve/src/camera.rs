@@ -499,7 +499,7 @@ impl Observer for Live {
         self.offered += 1;
         let look = Look {
             seen: Seen::Camera {
-                sum: newest.sum(),
+                frames: Box::new(newest.clone()),
                 run: Arc::clone(run),
                 depth: self.depth.clone(),
             },

@@ -171,6 +171,15 @@ impl Imaging {
         }
     }
 
+    /// Whether images start from the images before.
+    fn remembers(&self, settings: &Settings) -> bool {
+        let mut all = self.methods.iter();
+        settings.warm_start
+            && all
+                .find(|prepared| prepared.name == settings.method)
+                .is_some_and(|prepared| matches!(prepared.method.begin_video(), Ok(Some(_))))
+    }
+
     /// The method that these settings choose, prepared for their strength.
     fn method(&mut self, settings: &Settings) -> Result<&dyn Reconstruct, PictureError> {
         let mut all = self.methods.iter_mut();
@@ -327,7 +336,8 @@ impl Imaging {
         shared: &Shared,
     ) -> Result<Picture, PictureError> {
         let started = Instant::now();
-        let Measured { measurements, warnings: frame_warnings } = look.measured()?;
+        let Measured { measurements, warnings: frame_warnings } =
+            look.measured(self.remembers(settings))?;
         let method = self.method(settings)?;
         let made = moving.image(method, &measurements, look, settings)?;
         let flat_field = look.flat_field();

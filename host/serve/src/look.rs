@@ -7,9 +7,10 @@ use nirspi::clock::Instant;
 use nirspi::files::feed::Header;
 #[cfg(feature = "server")]
 use nirspi::files::measurement::Sweeps;
-use nirspi::integrate::{IntegrateError, Integrated};
+use nirspi::integrate::{IntegrateError, Newest};
 use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
+use nirspi::source::followed;
 #[cfg(feature = "server")]
 use nirspi::source::{Source, SourceError};
 use nirspi_nets::DepthMaps;
@@ -57,8 +58,8 @@ pub struct Look {
 /// Frames of a camera or of a feed.
 #[derive(Debug, Clone)]
 pub enum Seen {
-    /// The sum of frames, how they were measured, and the newest depth map.
-    Camera { sum: Integrated, run: Arc<RunSetup>, depth: Option<Arc<DepthImage>> },
+    /// The frames, how they were measured, and the newest depth map.
+    Camera { frames: Box<Newest>, run: Arc<RunSetup>, depth: Option<Arc<DepthImage>> },
     /// Frames of a feed, and what they are.
     #[cfg(feature = "server")]
     Feed { frames: Vec<Arc<[f64]>>, bench: Arc<Bench> },
@@ -139,21 +140,26 @@ impl Look {
     /// Number of frames.
     pub fn frames(&self) -> u64 {
         match &self.seen {
-            Seen::Camera { sum, .. } => sum.frames(),
+            Seen::Camera { frames, .. } => frames.frames(),
             #[cfg(feature = "server")]
             Seen::Feed { frames, .. } => frames.len() as u64,
         }
     }
 
-    /// What the frames have measured.
+    /// What the frames have measured: their sum, or where the scene changed meanwhile, the newest of them, added along its
+    /// way. A method that `remembers` the images before gets the sum, because it finds the motion by itself.
     ///
     /// # Errors
     /// [`MeasuredError`] if they give no measurements.
-    pub fn measured(&self) -> Result<Measured, MeasuredError> {
+    pub fn measured(&self, remembers: bool) -> Result<Measured, MeasuredError> {
         match &self.seen {
-            Seen::Camera { sum, run, .. } => {
-                let measurements = sum.measurements(&run.setup, run.settling.as_ref(), false)?;
-                Ok(Measured { measurements, warnings: sum.warnings() })
+            Seen::Camera { frames, run, .. } => {
+                let (sum, settling) = (frames.sum(), run.settling.as_ref());
+                let (measurements, warnings) = match remembers {
+                    true => (sum.measurements(&run.setup, settling, false)?, sum.warnings()),
+                    false => followed(&sum, &run.setup, settling, false)?,
+                };
+                Ok(Measured { measurements, warnings })
             }
             #[cfg(feature = "server")]
             Seen::Feed { frames, bench } => {

@@ -101,7 +101,7 @@ mod tests {
     use crate::settings::tests::settings;
     use nirspi::account::LossCounters;
     use nirspi::clock::Instant;
-    use nirspi::integrate::Integrated;
+    use nirspi::integrate::{Integrated, Newest};
     use nirspi::scene::{SceneMap, SceneSource};
     use nirspi::setup::MeasurementSetup;
     use nirspi_optics::CameraModel;
@@ -166,7 +166,7 @@ mod tests {
             });
             let look = Look {
                 seen: Seen::Camera {
-                    sum: made.capture.integrated,
+                    frames: Box::new(Newest::of_sum(made.capture.integrated)),
                     run: Arc::clone(run),
                     depth: None,
                 },
@@ -232,7 +232,11 @@ mod tests {
             sum.add_sums((0..patterns).map(|k| 1000 / (k as i64 + 1)), 1);
             let measurements = sum.measurements(&run.setup, None, false).unwrap();
             let counters = LossCounters::default();
-            let seen = Seen::Camera { sum, run: Arc::clone(&run), depth: None };
+            let seen = Seen::Camera {
+                frames: Box::new(Newest::of_sum(sum)),
+                run: Arc::clone(&run),
+                depth: None,
+            };
             let look = Look { seen, arrived, counters, newest };
             let made = moving.image(&faulty, &measurements, &look, &settings);
             made.ok().map(|made| made.report.warm)

@@ -431,9 +431,9 @@ fn states_come_while_an_image_takes_long() {
         std::thread::spawn(move || images(&shared, imaging, &publish))
     };
     let run = Arc::new(RunSetup { setup: setup(), settling: None, flat_field: None });
-    let sum = nirspi::integrate::Integrated::new(&run.setup);
+    let frames = Box::new(nirspi::integrate::Newest::new(&run.setup));
     let look = Look {
-        seen: Seen::Camera { sum, run, depth: None },
+        seen: Seen::Camera { frames, run, depth: None },
         arrived: Instant::now(),
         counters: Default::default(),
         newest: 1,
@@ -575,10 +575,10 @@ fn images_that_are_given_up_are_counted_and_frames_are_not_waited_for() {
     let began = Instant::now();
     let mut offered = 0;
     while shared.slot.ledger().images.shown < 4 {
-        let sum = nirspi::integrate::Integrated::new(&run.setup);
+        let frames = Box::new(nirspi::integrate::Newest::new(&run.setup));
         offered += 1;
         let (run, arrived) = (Arc::clone(&run), Instant::now());
-        let seen = Seen::Camera { sum, run, depth: None };
+        let seen = Seen::Camera { frames, run, depth: None };
         let look = Look { seen, arrived, counters: Default::default(), newest: offered };
         shared.slot.offer(look, Default::default(), Default::default());
         std::thread::sleep(Duration::from_millis(2));

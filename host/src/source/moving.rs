@@ -11,7 +11,7 @@ use nirspi_recon::Measurements;
 ///
 /// # Errors
 /// The errors of [`Integrated::measurements`].
-pub(super) fn measurements(
+pub fn measurements(
     integrated: &Integrated,
     setup: &MeasurementSetup,
     settling: Option<&Settling>,

@@ -1,9 +1,17 @@
 use super::*;
+use crate::camera::Connected;
 use crate::lock;
+use crate::look::Seen;
 use crate::overload::tests::given_up;
 use data_encoding::BASE64;
-use nirspi_recon::Measurements;
+use nirspi::capture::Calibration;
+use nirspi::scene::SceneSource;
+use nirspi::session::Session;
+use nirspi::setup::MeasurementSetup;
+use nirspi_optics::{CameraModel, Motion};
 use nirspi_recon::reconstruct::{Method, MethodSettings};
+use nirspi_recon::{Measurements, Order};
+use nirspi_virtual::{MemoryLink, VirtualOptics, calibrate_against_white};
 use serde_json::Value;
 
 /// The page of a virtual camera without networks, whose images sum 8 frames.
@@ -92,7 +100,7 @@ fn watched(page: &mut Turns, turns: usize) -> Vec<(Value, Measurements)> {
         let published = lock(&page.studio.told()).state(&page.shared).unwrap();
         if shown(page) > before {
             let message = serde_json::from_str(&published.message).unwrap();
-            made.push((message, look.measured().unwrap().measurements));
+            made.push((message, look.measured(true).unwrap().measurements));
         }
     }
     made
@@ -175,6 +183,59 @@ fn a_method_that_makes_each_image_by_itself_shows_the_newest_frames_as_before() 
     }
     page.command("/api/settings", br#"{"method": "tikhonov"}"#).unwrap();
     assert_eq!(warm(&mut page, 4), [false, true]);
+}
+
+/// A page of a letter that crosses the field at half a metre a second: a pixel in each frame.
+fn page_of_a_moving_letter() -> Turns {
+    let model = CameraModel::paper().clone();
+    let map = "letter:R".parse::<SceneSource>().unwrap().load(256).unwrap();
+    let optics = VirtualOptics::before(&model, &map, 300.0).unwrap();
+    let motion = Motion { speed_m_per_s: 0.5, ..Motion::default() };
+    let optics = optics.moving(motion).unwrap();
+    let setup = optics.setup(&Order::ZigZag, 1.0).unwrap();
+    let settling = calibrate_against_white(&optics, 1).unwrap();
+    let connect = move |_: Option<&_>| {
+        let session = Session::open(Box::new(MemoryLink::new(optics.camera(1)?)))?;
+        let calibration = Calibration::Kept(settling.clone());
+        Ok(Connected { session, calibration, note: None, flat_field: None })
+    };
+    let source = CameraSource {
+        address: "virtual".to_owned(),
+        setup: MeasurementSetup { sweeps: 36, ..setup },
+        model,
+        scene: None,
+        record_to: None,
+        connect: Box::new(connect),
+    };
+    let mut page = Turns::with_every_method(source, None).unwrap();
+    page.command("/api/settings", br#"{"enhance": false, "method": "tikhonov", "frames": 16}"#)
+        .unwrap();
+    page
+}
+
+/// Judged by the newest frame alone, whose noise is small beside the smear of 16 frames.
+#[test]
+fn an_image_of_a_moving_target_stands_where_its_newest_frame_does() {
+    let mut page = page_of_a_moving_letter();
+    for _ in 0..3 {
+        page.camera();
+    }
+    let look = page.shared.slot.take_now().unwrap();
+    let Seen::Camera { frames, run, .. } = &look.seen else { panic!("a camera") };
+    let (_, newest) = frames.sum().newest().last().unwrap();
+    let newest = newest.measurements(&run.setup, run.settling.as_ref(), false).unwrap();
+    let off = |remembers: bool| {
+        let measured = look.measured(remembers).unwrap();
+        let pairs = measured.measurements.values().iter().zip(newest.values());
+        (pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt(), measured.warnings)
+    };
+    let ((along, said), (smeared, warned)) = (off(false), off(true));
+    assert!(along < 0.4 * smeared, "{along} and {smeared}");
+    assert!(said.iter().any(|said| said.contains("added along its way")), "{said:?}");
+    assert!(warned.iter().any(|said| said.contains("smeared")), "{warned:?}");
+    page.studio.make(&page.shared, &look);
+    let published = lock(&page.studio.told()).state(&page.shared).unwrap();
+    assert!(published.message.contains("added along its way"), "{}", published.message);
 }
 
 #[test]
