@@ -10,7 +10,7 @@
 
 #![allow(unsafe_code, reason = "the names of functions that another language calls are exported")]
 
-use crate::lesson::{Lesson, Made, drawn, named};
+use crate::lesson::{Lesson, Made, Reading, drawn, named};
 use crate::{Problem, Pursuit, in_one_line, sight};
 use nirspi_recon::{Basis, Image};
 use std::cell::RefCell;
@@ -24,8 +24,6 @@ unsafe extern "C" {
 /// The lesson and its buffers. A browser calls from one thread.
 #[derive(Default)]
 struct Program {
-    /// What the lens would see in clear air at its focus: the scene that was chosen.
-    chosen: Option<Image>,
     lesson: Option<Lesson>,
     pursuit: Option<Pursuit>,
     asked: Vec<u8>,
@@ -47,8 +45,8 @@ impl Program {
     }
 
     fn choose(&mut self, scene: Image) -> Result<Vec<f64>, Problem> {
-        let numbers = of_image(&scene);
-        self.chosen = Some(scene.clone());
+        let light: f64 = scene.pixels().iter().map(|&v| f64::from(v)).sum();
+        let numbers = of_image(&scene).chain([light]).collect();
         match &mut self.lesson {
             Some(lesson) => lesson.look_at(scene),
             None => self.lesson = Some(Lesson::new(scene)?),
@@ -75,13 +73,13 @@ fn step(work: impl FnOnce(&mut Program) -> Result<Vec<f64>, Problem>) -> bool {
     })
 }
 
-fn of_image(image: &Image) -> Vec<f64> {
-    image.pixels().iter().map(|&v| v.into()).collect()
+fn of_image(image: &Image) -> impl Iterator<Item = f64> {
+    image.pixels().iter().map(|&v| v.into())
 }
 
 /// An image, then its error.
 fn of_made(made: &Made) -> Vec<f64> {
-    of_image(&made.image).into_iter().chain([made.error]).collect()
+    of_image(&made.image).chain([made.error]).collect()
 }
 
 fn widened(values: Vec<f32>) -> Vec<f64> {
@@ -107,7 +105,7 @@ extern "C" fn begin() {
     }));
 }
 
-/// Chooses the scene in the room, a name. The answer is the scene.
+/// Chooses the scene in the room, a name. The answer is the scene, then its light.
 #[unsafe(no_mangle)]
 extern "C" fn scene_named() -> bool {
     step(|program| {
@@ -116,7 +114,7 @@ extern "C" fn scene_named() -> bool {
     })
 }
 
-/// Chooses the scene in the room, a drawing of 32-bit numbers. The answer is the scene.
+/// Chooses the scene in the room, a drawing of 32-bit numbers. The answer is the scene, then its light.
 #[unsafe(no_mangle)]
 extern "C" fn scene_drawn() -> bool {
     step(|program| {
@@ -126,14 +124,15 @@ extern "C" fn scene_drawn() -> bool {
     })
 }
 
-/// What the camera sees of the chosen scene in the weather in the room. The lesson goes on with the
-/// scene that was chosen. The answer is what it sees.
+/// What the camera sees of the scene in the weather in the room, then its error. The lesson goes on
+/// with the scene itself.
 #[unsafe(no_mangle)]
 extern "C" fn weather_named(distance_mm: f64, seed: u32) -> bool {
     step(|program| {
         let weather = program.text();
-        let chosen = program.chosen.as_ref().ok_or("no scene was chosen")?;
-        Ok(of_image(&sight::seen(chosen, distance_mm, &weather, seed.into())?))
+        let lesson = program.lesson()?;
+        let seen = sight::seen(lesson.scene(), distance_mm, &weather, seed.into())?;
+        lesson.compared(seen).map(|made| of_made(&made))
     })
 }
 
@@ -166,12 +165,13 @@ extern "C" fn light(place: usize) -> bool {
     step(|program| program.lesson()?.light(place).map(widened))
 }
 
-/// The readings: of each pattern, then of its negative.
+/// The readings in the order shown: of a pattern, of its negative, and their difference.
 #[unsafe(no_mangle)]
 extern "C" fn readings() -> bool {
     step(|program| {
         let readings = program.lesson()?.readings()?;
-        Ok(readings.into_iter().flat_map(|reading| [reading.pattern, reading.negative]).collect())
+        let numbers = |read: Reading| [read.pattern, read.negative, read.difference()];
+        Ok(readings.into_iter().flat_map(numbers).collect())
     })
 }
 
