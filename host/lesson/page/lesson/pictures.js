@@ -53,7 +53,7 @@ export function bars(canvas, numbers) {
 // Curves from 0 to 1 over steps, each up to its own length, with a mark at one step.
 export function curves(canvas, lines, at) {
   const { pen: ink, width, height } = pen(canvas), steps = Math.max(1, lines[0].values.length - 1);
-  const left = 44, x = step => left + step / steps * (width - left - 10), y = value => 8 + (1 - Math.min(value, 1)) * (height - 16);
+  const left = 56, x = step => left + step / steps * (width - left - 10), y = value => 8 + (1 - Math.min(value, 1)) * (height - 16);
   ink.font = "13px system-ui, sans-serif";
   ink.textAlign = "right";
   ink.textBaseline = "middle";

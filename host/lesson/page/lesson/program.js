@@ -55,8 +55,8 @@ export function live(id, refresh) {
 }
 
 // One order for the whole page.
-const ORDERS = { "cake-cutting": "few blocks first (cake-cutting)", "zig-zag": "coarse first (zig-zag)",
-  "russian-dolls": "doubling (Russian dolls)", natural: "natural", "random:1": "shuffled (random:1)" };
+const ORDERS = { "cake-cutting": "few blocks first", "zig-zag": "zig-zag", "russian-dolls": "Russian dolls", natural: "natural",
+  "random:1": "shuffled" };
 let current = "cake-cutting";
 export const order = () => current;
 for (const select of document.querySelectorAll("[data-order]")) {
