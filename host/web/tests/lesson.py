@@ -354,6 +354,10 @@ def main():
             step(page)
         assert all(url.startswith(base) for url in asked), asked
         assert not problems, problems
+        # From the lesson to the live camera and back.
+        page.get_by_role("link", name="the live camera").first.click()
+        page.get_by_role("link", name="lesson", exact=True).click()
+        expect(page.locator("h1")).to_have_text("One pixel makes a picture")
         page.close()
         screens(browser, base, given.screenshots)
         page = browser.new_page()
