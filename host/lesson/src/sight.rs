@@ -57,6 +57,11 @@ mod tests {
         assert!(apart(&scene, &sharp) < 1e-3, "{}", apart(&scene, &sharp));
         let (by_rain, by_distance) = (apart(&sharp, &rain), apart(&sharp, &far));
         assert!(by_rain > 0.0 && by_rain < 0.05 * by_distance, "{by_rain} {by_distance}");
+        // Blur moves light and takes none, and rain at a distance is as harmless.
+        let mean = |image: &Image| image.pixels().iter().sum::<f32>() / 1024.0;
+        assert!((mean(&far) / mean(&sharp) - 1.0).abs() < 0.05, "{} {}", mean(&far), mean(&sharp));
+        let both = apart(&far, &seen(&scene, 600.0, "rain:50", 1).unwrap());
+        assert!(both > 0.0 && both < 0.05 * by_distance, "{both} {by_distance}");
         let window = apart(&sharp, &seen(&scene, 300.0, "window:0.3", 1).unwrap());
         assert!(window > 10.0 * by_rain, "{window} {by_rain}");
     }
