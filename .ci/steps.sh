@@ -428,6 +428,7 @@ step_web() {
         cargo build --locked --example in_turns
         python_with browser playwright==1.65.2
         local built=${CARGO_TARGET_DIR:-target}
+        target/browser/bin/python host/web/tests/lesson.py target/book/camera
         target/browser/bin/python host/web/tests/check.py target/book/camera "$built/debug/examples/in_turns" "$built/release/nirspi"
     else
         echo "skipped: the camera in a browser, no chromium"

@@ -17,7 +17,7 @@ def jupyter():
 
 
 def test_every_notebook_is_tested():
-    assert set(NAMES) == PEERS | {"dataset", "measurements", "orders"}
+    assert set(NAMES) == PEERS | {"dataset", "lesson", "measurements", "orders"}
     used = {file for name in NAMES for cell in cells(page(name).read_text()) for _, file in cell.pictures}
     there = {path.name for path in FOLDER.iterdir() if path.suffix != ".ipynb"}
     assert used == there

@@ -48,6 +48,12 @@ export function listen(show, gone) {
 $("scene").open = true;
 document.querySelector("main").prepend($("scene"));
 
+// The lesson lies in the same folder.
+const lesson = document.createElement("a");
+lesson.href = "./lesson.html";
+lesson.textContent = "lesson";
+$("camera").after(lesson);
+
 // From the virtual camera to one on USB and back, by loading the page again.
 if (isReal || isOffered()) {
   const button = document.createElement("button"), answer = document.createElement("span");

@@ -38,6 +38,8 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/bring-up.md", "nirspi camera devices", "opens every serial port of this machine"),
     ("docs/browser.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
     ("docs/browser.md", "http.server", "runs until it is stopped; .ci/run web"),
+    ("docs/lesson.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
+    ("docs/lesson.md", "http.server", "runs until it is stopped; .ci/run web"),
     ("docs/clusters.md", "reconstruct archive/", "the user's archive; tests/cli/many.rs"),
     ("docs/clusters.md", "ray start", "needs Ray; .ci/run cluster"),
     ("docs/own-patterns.md", "theirs.npz", "the user's patterns; tests/cli/own_patterns.rs"),
