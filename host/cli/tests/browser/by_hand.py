@@ -100,6 +100,8 @@ def message(given):
         "record": False,
     }
     state["picture"] = {
+        "n": 32,
+        "unit": "ADC counts",
         "arrived_unix_ms": 1_764_000_000_123,
         "method": "tv",
         "order": "natural",
@@ -295,7 +297,7 @@ def facts(browser, address):
         "images": "images a second: now 24.3",
         "delay": "delay, p99, ms: now 1235",
         "losses": "frames not received: now 3.0",
-        "signal": "signal, ADC counts: now 1000.0",
+        "signal": "signal: now 1000.0",
         "snr": "signal to noise: now 22.2",
     }
     page.wait_for_timeout(600)
@@ -727,4 +729,46 @@ def silent(told):
     told.tell(camera={"phase": "measuring", "leds": "on", "leds_age_ms": 0}, light={"allowed": True})
 
 
-PARTS = [facts, pictures, controls, stream]
+def feed(browser, address):
+    """A bench that is no camera: its side and unit, and no word and no key for LEDs."""
+    told = Told(browser, address)
+    page = told.page
+    account = {"frames": 9, "empty_frames": 0, "refused": 2, "not_read": 0, "cut": 0}
+    bench = {"name": "DMD of room 3", "unit": "V", "n": 16, "order": "zig-zag", "patterns": 200, "readings": "pairs", "account": account}
+    told.message |= {name: packed([at / 512 for at in range(16 * 16)]) for name in ["image", "readings"]}
+    told.message |= {"enhanced": None, "interval": None, "depth": None}
+    told.tell(
+        camera={"address": "feed:-", "identity": None, "leds": "none", "versions": [], "measurement": None, "feed": bench},
+        offered={"fixed": True},
+        scene=None,
+        images={"shown": 12},
+        picture={"n": 16, "unit": "V", "white_counts": 0.5, "enhancement": None},
+    )
+    told.has("camera", "DMD of room 3")
+    expect(page).to_have_title("nirspi DMD of room 3")
+    expect(page.locator(".leds")).to_be_hidden()
+    page.keyboard.press("Escape")
+    page.keyboard.press("Space")
+    told.sends()
+    expect(page.locator("#alarm")).to_be_hidden()
+    for name in ["order", "sampling", "sweeps"]:
+        expect(page.locator(f"#{name}")).to_be_hidden()
+    found = pointed(page, "image", 16, 3, 8)
+    assert found == "row 8, column 3: 0.256 V, 51 % of white", found
+    expect(page.locator("#about-image").locator("xpath=..")).to_contain_text("reconstructed, 16 × 16")
+    told.has("no-enhanced", "off: the networks take 32 × 32 and 64 × 64")
+    identity = rows(page, "identity")
+    assert identity == [
+        ["address", "feed:-", ""],
+        ["patterns", "200, 16 × 16", ""],
+        ["order", "zig-zag", ""],
+        ["readings", "pairs", ""],
+        ["numbers refused", "2", "loss"],
+        ["readings not read", "0", ""],
+    ], identity
+    told.tell(camera={"phase": "silent", "line": "no data for 3 s"})
+    told.has("line", "no data for 3 s")
+    page.close()
+
+
+PARTS = [facts, pictures, controls, stream, feed]

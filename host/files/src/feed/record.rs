@@ -63,8 +63,8 @@ impl Recorder {
         names.find(|name| !name.exists()).unwrap_or_default()
     }
 
-    /// Begins a recording. The first file is `path`; the next are `NAME-2.npz`, `NAME-3.npz` and so on. A name that is
-    /// taken is refused unless `overwrite` is set.
+    /// Begins a recording. The first file is `path`; the next are `NAME-2.npz`, `NAME-3.npz` and so on. Without
+    /// `overwrite`, a `path` that is taken is refused, and later names that are taken are left out.
     ///
     /// # Errors
     /// [`FileError`] if the name is taken, or the system refuses.
@@ -131,13 +131,9 @@ impl Recorder {
     /// Lets a thread complete the file of the frames so far, while frames go on into the next.
     fn complete(&mut self) -> Result<(), FileError> {
         self.completed()?;
-        let number = self.recorded.files.len() + 1;
-        let path = match number {
-            1 => self.path.clone(),
-            _ => {
-                let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-                self.path.with_file_name(format!("{stem}-{number}.npz"))
-            }
+        let path = match self.recorded.files.len() {
+            0 => self.path.clone(),
+            written => self.next_name(written + 1),
         };
         let failed = |error| FileError::io(&self.path, "write", error);
         let next = BufWriter::with_capacity(PIECE, Spool::beside(&self.path)?);
@@ -151,6 +147,13 @@ impl Recorder {
             .map_err(failed)?;
         self.completing = Some(completing);
         Ok(())
+    }
+
+    /// The name of a further file. A name that is taken must not cost its frames.
+    fn next_name(&self, number: usize) -> PathBuf {
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut names = (number..).map(|at| self.path.with_file_name(format!("{stem}-{at}.npz")));
+        names.find(|name| self.overwrite || !name.exists()).unwrap_or_default()
     }
 
     /// Waits for the file that is being completed.
@@ -283,13 +286,14 @@ mod tests {
         assert_eq!(large.most, (512 << 20) / 8 / 8192);
         drop(large);
         recorder.most = 2;
+        std::fs::write(folder.path().join("rec-3.npz"), b"somebody's").unwrap();
         for frame in 0..5 {
             recorder.push(&[f64::from(frame), 1.0]).unwrap();
         }
         let recorded = recorder.finish().unwrap();
         let names: Vec<_> =
             recorded.files.iter().map(|file| file.file_name().unwrap().to_str().unwrap()).collect();
-        assert_eq!((names, recorded.frames), (vec!["rec.npz", "rec-2.npz", "rec-3.npz"], 5));
+        assert_eq!((names, recorded.frames), (vec!["rec.npz", "rec-2.npz", "rec-4.npz"], 5));
         let want = Selection { index: Some(0), ..Selection::default() };
         let last = measurement::read(&recorded.files[2], &want).unwrap();
         assert_eq!(last.readings, Readings::Single(vec![4.0, 1.0]));
