@@ -121,7 +121,7 @@ fn the_command_line_computes_nothing() {
 }
 
 /// The most lines of the command line's sources. What does not fit belongs into a library.
-const CLI_LINES: usize = 6500;
+const CLI_LINES: usize = 6750;
 
 #[test]
 fn the_command_line_has_fewer_lines_than_its_limit() {
