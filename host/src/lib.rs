@@ -40,6 +40,7 @@ pub mod heartbeat;
 pub mod imaging;
 #[cfg(not(target_family = "wasm"))]
 pub mod inspect;
+pub mod moving;
 #[cfg(all(feature = "pictures", not(target_family = "wasm")))]
 pub mod patterns;
 #[cfg(feature = "pictures")]

@@ -6,6 +6,7 @@ use crate::capture::Capture;
 use crate::files::FileError;
 use crate::files::measurement::{self, Form, MeasurementFile, Readings, Reference, Selection};
 use crate::integrate::IntegrateError;
+use crate::moving::followed;
 use crate::provenance::Taken;
 use crate::recording::RecordingError;
 use crate::tally::Misfit;
@@ -22,11 +23,9 @@ use std::str::FromStr;
 use thiserror::Error;
 
 mod halves;
-mod moving;
 mod recording;
 mod several;
 
-pub use moving::measurements as followed;
 pub(crate) use recording::of_sum;
 use recording::{frames_of_recording, from_recording};
 pub use several::Several;
@@ -337,8 +336,7 @@ impl Source {
     /// [`IntegrateError`] if its frames give no measurements.
     pub fn of_capture(capture: &Capture) -> Result<Self, IntegrateError> {
         let Capture { camera, setup, settling, integrated, counters, .. } = capture;
-        let (measurements, mut notes) =
-            moving::measurements(integrated, setup, settling.as_ref(), false)?;
+        let (measurements, mut notes) = followed(integrated, setup, settling.as_ref(), false)?;
         notes.extend(settling.is_none().then(|| NOT_CALIBRATED.to_owned()));
         let read = of_frames(measurements)?;
         Ok(Self {

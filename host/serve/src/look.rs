@@ -8,9 +8,9 @@ use nirspi::files::feed::Header;
 #[cfg(feature = "server")]
 use nirspi::files::measurement::Sweeps;
 use nirspi::integrate::{IntegrateError, Newest};
+use nirspi::moving::followed;
 use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
-use nirspi::source::followed;
 #[cfg(feature = "server")]
 use nirspi::source::{Source, SourceError};
 use nirspi_nets::DepthMaps;

@@ -1,11 +1,11 @@
 //! Reads the frames of a recording as measurements: their sum, or each of them.
 
-use super::moving;
 use super::several::fits_together;
 use super::{NOT_CALIBRATED, Source, SourceError, SourceOptions, not_whole};
 use crate::calibration::KeptFlatField;
 use crate::causes;
 use crate::integrate::Integrated;
+use crate::moving::followed;
 use crate::provenance::Taken;
 use crate::recording::{self, End, Recording, tally_recording};
 use crate::tally::Tally;
@@ -82,7 +82,7 @@ fn of_frames(
     let Recording { setup, settling, .. } = recording;
     let End { cut_short, account, .. } = recording.end();
     let (measurements, mut notes) =
-        moving::measurements(integrated, setup, settling.as_ref(), options.keep_leak)
+        followed(integrated, setup, settling.as_ref(), options.keep_leak)
             .map_err(|problem| SourceError::Integrate { path: path.to_owned(), problem })?;
     let mut lacks = Vec::new();
     lacks.extend(cut_short.as_ref().map(|reason| format!("cut short or damaged: {reason}")));

@@ -11,7 +11,7 @@ use nirspi_recon::Measurements;
 ///
 /// # Errors
 /// The errors of [`Integrated::measurements`].
-pub fn measurements(
+pub fn followed(
     integrated: &Integrated,
     setup: &MeasurementSetup,
     settling: Option<&Settling>,
