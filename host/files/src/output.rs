@@ -19,12 +19,16 @@
 //! (`tests::a_folder_keeps_no_file_open_however_many_it_takes`).
 
 mod earlier;
+#[cfg(not(target_family = "wasm"))]
+mod spool;
 
 use super::FileError;
 use super::interrupt::Noted;
 use earlier::Earlier;
+#[cfg(not(target_family = "wasm"))]
+pub(crate) use spool::Spool;
 use std::fs;
-use std::io::{self, BufWriter, IntoInnerError, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempPath;
 
@@ -351,42 +355,6 @@ fn hidden(target: &Path) -> Result<(fs::File, Staged), FileError> {
     let staged = made.map_err(|error| FileError::io(target, "write", error))?;
     let ((file, noted), path) = staged.into_parts();
     Ok((file, Staged { path, behind, _noted: noted }))
-}
-
-/// A hidden file beside a result, with numbers that become part of the result later. It is removed when it is dropped.
-#[derive(Debug)]
-pub(crate) struct Spool {
-    file: fs::File,
-    _staged: Staged,
-}
-
-impl Spool {
-    /// A new, empty one.
-    pub(crate) fn beside(target: &Path) -> Result<Self, FileError> {
-        hidden(target).map(|(file, _staged)| Self { file, _staged })
-    }
-}
-
-impl Write for Spool {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
-}
-
-impl Read for Spool {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.file.read(bytes)
-    }
-}
-
-impl Seek for Spool {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to)
-    }
 }
 
 /// A file under its hidden name.
