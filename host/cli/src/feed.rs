@@ -63,7 +63,8 @@ pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
     };
     let recorded = record_feed(&mut feed, recorder, frames, seconds, watch)?;
     drop(bar);
-    report.print(&recorded, &provenance, |recorded| say(address, recorded))?;
+    let say = |recorded: &FeedReport| recorded.words(address).iter().try_for_each(print::line);
+    report.print(&recorded, &provenance, say)?;
     match &recorded.missing {
         None => Ok(ExitCode::SUCCESS),
         Some(missing) => {
@@ -86,29 +87,6 @@ pub fn refuse_others(known: &[&str]) -> Result<()> {
         Some(other) => {
             let why = "a feed says in its header what is measured";
             Err(Usage(format!("--{other} does not go with --camera feed:ADDR: {why}")).into())
-        }
-    }
-}
-
-fn say(address: &Address, report: &FeedReport) -> Result<()> {
-    let FeedReport { n, order, readings, account, ended, seconds, readings_per_s, .. } = report;
-    let name = report.name.clone().unwrap_or_else(|| address.to_string());
-    print::line(format_args!("{name}: {n} x {n}, order {order}, readings {readings}"))?;
-    print::line(format_args!("{account}; {ended}"))?;
-    print::line(format_args!("{readings_per_s:.0} readings/s over {seconds:.2} s"))?;
-    match &report.files[..] {
-        [] => Ok(()),
-        [file, others @ ..] => {
-            let files: Vec<String> =
-                report.files.iter().map(|file| file.display().to_string()).collect();
-            let open = match others {
-                [] => format!("{} --index all", file.display()),
-                _ => files.join(" "),
-            };
-            print::line(format_args!(
-                "wrote {}; nirspi reconstruct {open} makes images",
-                files.join(", ")
-            ))
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Seconds, StopCause};
 use nirspi_files::FileError;
-use nirspi_files::feed::{Account, End, Feed, Next, Recorder};
+use nirspi_files::feed::{Account, Address, End, Feed, Next, Recorder};
 use nirspi_recon::words::count;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -53,6 +53,29 @@ pub struct FeedReport {
     pub seconds: f64,
     /// Readings a second.
     pub readings_per_s: f64,
+}
+
+impl FeedReport {
+    /// The report in words, a line each.
+    #[must_use]
+    pub fn words(&self, address: &Address) -> Vec<String> {
+        let Self { n, order, readings, account, ended, seconds, readings_per_s, .. } = self;
+        let name = self.name.clone().unwrap_or_else(|| address.to_string());
+        let mut words = vec![
+            format!("{name}: {n} x {n}, order {order}, readings {readings}"),
+            format!("{account}; {ended}"),
+            format!("{readings_per_s:.0} readings/s over {seconds:.2} s"),
+        ];
+        let files: Vec<String> = self.files.iter().map(|file| file.display().to_string()).collect();
+        let open = match &files[..] {
+            [] => return words,
+            [file] => format!("{file} --index all"),
+            files => files.join(" "),
+        };
+        let files = files.join(", ");
+        words.push(format!("wrote {files}; nirspi reconstruct {open} makes images"));
+        words
+    }
 }
 
 /// Records frames until as many have come as were requested, the time is over, the feed ends, or `watch` breaks.
