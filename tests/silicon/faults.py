@@ -37,6 +37,7 @@ FAULTS = [
     # What the firmware tries before a run.
     ("training", "mcu/src/training.rs", "Ok(true) if is_whole(room) =>", "Ok(true) =>", "", "wrong_phase"),
     ("enable of the self-test", "mcu/src/enables.rs", "if self.high == High::BoardAlone { mode::UNLIT } else { 0 };", "0;", "", "stuck_led_enable"),
+    ("first light", f"{U5}/main.rs", "limits: Limits::default(),", "limits: Limits::SIMULATED,", "", "refuses_the_first_run"),
     ("feed", f"{U5}/board.rs", "self.watchdog.pet();", "", "", "stops_reading"),
     ("pin", f"{U5}/pins.rs", "bits.set_br(14, true)", "bits.set_br(13, true)", "", "crash_while_lit"),
     ("list", f"{U5}/parallel.rs", "number as u32 * u32::from(BLOCK_BYTES)", "number as u32 * u32::from(BLOCK_BYTES / 2)", "parallel", "bit_for_bit"),
