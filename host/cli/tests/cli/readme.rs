@@ -37,6 +37,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/bring-up.md", "openFPGALoader", "needs the FPGA board"),
     ("docs/bring-up.md", "nirspi camera devices", "opens every serial port of this machine"),
     ("docs/browser.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
+    ("docs/gallery.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
     ("docs/browser.md", "http.server", "runs until it is stopped; .ci/run web"),
     ("docs/lesson.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
     ("docs/lesson.md", "http.server", "runs until it is stopped; .ci/run web"),
