@@ -37,6 +37,8 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/bring-up.md", "openFPGALoader", "needs the FPGA board"),
     ("docs/bring-up.md", "nirspi camera devices", "opens every serial port of this machine"),
     ("docs/browser.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
+    ("docs/feeds.md", "python bench.py", "a bench sends for ever; tests/cli/feed.rs"),
+    ("docs/feeds.md", "reconstruct rec.npz", "the recording of that bench; tests/cli/feed.rs"),
     ("docs/gallery.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
     ("docs/browser.md", "http.server", "runs until it is stopped; .ci/run web"),
     ("docs/lesson.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
