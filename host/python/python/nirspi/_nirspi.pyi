@@ -52,7 +52,8 @@ _U64 = NDArray[np.uint64]
 # Reports with the number of images in a row that each is of; rows; pixels for the networks.
 _Account = tuple[list[tuple[str, int]], list[_I64], _F32]
 
-class Error(ValueError): ...
+class Error(ValueError):
+    """What nirspi refuses, and why: one line that says what was found and what was expected."""
 
 def order(name: str, n: int) -> _I64: ...
 def orders() -> list[tuple[str, str, str | None, bool]]: ...
