@@ -2,6 +2,9 @@
 
 It reads the Python files and the stub of the compiled part, and imports nothing. `tests/test_reference.py`
 fails when the page is stale: `python3 host/python/reference.py` writes it.
+
+griffe2md 1.5 was tried: 6457 lines where this page has 1350, each module told twice, and the docstrings'
+roles and double backticks left as they are.
 """
 
 import ast

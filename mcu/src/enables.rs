@@ -2,7 +2,8 @@
 //! still switches the LEDs on and off.
 //!
 //! The self-test asks, and so does the first light after power-up, after gateware was loaded and after the FPGA was absent:
-//! a run or a raw burst begins once both enables are sound. [`Limits::tries_enables`] says whether a board does that.
+//! a run or a raw burst begins once both enables are sound. [`Limits::tries_enables`] says whether a board does that; the
+//! virtual camera and the emulated board do not.
 //!
 //! All LEDs go on and off in slots of two microseconds, three times for 0.3 milliseconds, and the detector says whether
 //! their light follows:

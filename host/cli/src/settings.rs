@@ -32,7 +32,7 @@ pub struct GeneralArgs {
     /// Also print, on stderr, the time of each stage and where each default comes from
     #[arg(short, long, global = true)]
     pub verbose: bool,
-    /// Take defaults for options from this file (TOML): `frames = 1000` stands for --frames 1000. The environment variable
+    /// Take defaults for options from this file (TOML): `frames = 1000` is the same as --frames 1000. The environment variable
     /// NIRSPI_FRAMES beats the file, and the command line beats both
     #[arg(long, value_name = "FILE", global = true)]
     settings: Option<PathBuf>,

@@ -195,6 +195,11 @@ impl Contents {
         self.fields.read(array, |_| Ok(())).ok().map(|field| field.real)
     }
 
+    /// Whether the file says that no real light was measured; `None` if it does not say.
+    pub fn simulated(&mut self) -> Option<bool> {
+        measurement::read_simulated(&mut self.fields)
+    }
+
     /// The measurement of this file that a user asks for.
     ///
     /// # Errors

@@ -54,7 +54,7 @@ pub use images::read_images_of;
 use nirspi_recon::law::Claim;
 use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
-pub(crate) use opened::is_reading;
+pub(crate) use opened::{is_reading, read_simulated};
 pub use patterns::{PatternSelection, Patterns};
 pub use plain::{Plain, read_plain};
 use rayon::prelude::*;

@@ -18,9 +18,9 @@ const LEFT: f64 = 1e-6;
 const SETTLED_PX: f64 = 0.02;
 /// The most that a turn changes the motion, in pixels a frame.
 const MOST_PX: f64 = 0.3;
-/// Squares are more than noise where their mean exceeds its expectation by so many standard deviations,
+/// A mean of squares is more than noise if it exceeds what noise gives by this many standard deviations, ...
 const SURE: f64 = 3.5;
-/// and by this share, which the noise itself is not known to.
+/// ... and by this share, because the noise itself is an estimate.
 const NOISE_KNOWN_TO: f64 = 0.03;
 /// Power of a scene's frequency `f`, in cycles a pixel, for a scene of variance 1: this over `(CANVAS f)^2`. The
 /// sum over all frequencies of a canvas of 64 x 64 pixels is its variance.
@@ -205,10 +205,11 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// What is left of the newest frames beyond noise, as the square of a reading: of the mean of the newest one, two, four and so
-/// on, the most. The newest frame comes first. Not more than noise lets see counts as nothing.
+/// What the newest frames show beside the fit and noise, as the mean square of a reading. `left` is what the fit leaves of each
+/// frame, the newest first. The mean of the newest frame, of the newest two, four and so on is looked at, and the largest
+/// excess over noise counts; an excess that noise can make counts as 0.
 ///
-/// The mean over all frames does not show a target that has just changed its way: most of them were before that.
+/// A mean over all frames does not show that a target has just changed its way, because most frames are from before that.
 pub(crate) fn beyond_noise<I>(left: impl Iterator<Item = I>, noise: f64) -> f64
 where
     I: Iterator<Item = f64>,
@@ -234,7 +235,7 @@ where
     most
 }
 
-/// The most that a mean of so many squares is by noise alone, where `expected` is its expectation.
+/// The largest mean of `readings` squares that noise alone makes, if it makes `expected` of them on average.
 pub(crate) fn most_by_noise(expected: f64, readings: f64) -> f64 {
     expected * (1.0 + SURE * (2.0 / readings).sqrt() + NOISE_KNOWN_TO)
 }

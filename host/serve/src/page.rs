@@ -9,7 +9,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Path, type and content of each file that the page loads.
-const FILES: [(&str, &str, &str); 21] = [
+const FILES: [(&str, &str, &str); 22] = [
     ("/page/style.css", STYLE, include_str!("page/style.css")),
     ("/page/main.js", SCRIPT, include_str!("page/main.js")),
     ("/page/connection.js", SCRIPT, include_str!("page/connection.js")),
@@ -29,6 +29,7 @@ const FILES: [(&str, &str, &str); 21] = [
     ("/page/colours.js", SCRIPT, include_str!("page/colours.js")),
     ("/page/history.js", SCRIPT, include_str!("page/history.js")),
     ("/page/plots.js", SCRIPT, include_str!("page/plots.js")),
+    ("/page/brush.js", SCRIPT, include_str!("page/brush.js")),
     ("/page/scene.js", SCRIPT, include_str!("page/scene.js")),
     ("/page/line.js", SCRIPT, include_str!("page/line.js")),
 ];

@@ -10,8 +10,6 @@ FOLDER is that of `host/web/build.sh`, IN_TURNS the program of `cargo build --ex
 
 import argparse
 import base64
-import functools
-import http.server
 import json
 import math
 import os
@@ -28,10 +26,9 @@ from playwright.sync_api import expect, sync_playwright
 # No compiled files beside the sources.
 sys.dont_write_bytecode = True
 sys.path.append(str(pathlib.Path(__file__).parents[2] / "cli/tests/browser"))
+import folder
+from folder import LIMIT_MS, served, watched
 from pictures import LEVELS, fits, levels, looks_like, seen
-
-# No wait takes longer, on a busy machine either.
-LIMIT_MS = 60_000
 
 # Commands between turns. The last image is fused with the depth map of the run's beginning.
 SCRIPT = """POST /api/settings {"frames": FRAMES, "method": "METHOD", "order": "zig-zag", "sampling": SAMPLING}
@@ -116,8 +113,8 @@ class Camera:
             return None
 
 
-class Files(http.server.SimpleHTTPRequestHandler):
-    """A plain file server. Under /missing, /cut and /panic it serves the same folder with one thing wrong, under /usb-camera
+class Files(folder.Files):
+    """A file server. Under /missing, /cut and /panic it serves the same folder with one thing wrong, under /usb-camera
     with a device in place of the browser's own USB. /usb is that device's other side."""
 
     camera = None
@@ -155,9 +152,6 @@ class Files(http.server.SimpleHTTPRequestHandler):
         # No memory has so much room.
         content = content[: len(content) // 2] if wrong == "cut" else content.replace(b"patient(program.turn)()", b"program.room(-1)")
         self.answer(content, self.guess_type(self.path))
-
-    def log_message(self, *_):
-        pass
 
 
 def in_the_browser(page, script):
@@ -412,10 +406,7 @@ def main():
     parser.add_argument("--screenshots")
     parser.add_argument("--least", type=float, default=0.0)
     given = parser.parse_args()
-    handler = functools.partial(Files, directory=given.folder)
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    base = f"http://127.0.0.1:{server.server_address[1]}"
+    base = served(Files, given.folder)
     expect.set_options(timeout=LIMIT_MS)
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
@@ -423,10 +414,7 @@ def main():
         page.set_default_timeout(LIMIT_MS)
         page.goto(f"{base}/page/style.css")
         equal(page, given.in_turns)
-        asked, problems = [], []
-        page.on("request", lambda request: asked.append(request.url))
-        page.on("pageerror", lambda error: problems.append(str(error)))
-        page.on("console", lambda said: problems.append(said.text) if said.type == "error" else None)
+        asked, problems = watched(page)
         measuring(page, f"{base}/index.html")
         got = rate(page)
         letter = page.locator("#image").evaluate(LEVELS)

@@ -7,29 +7,26 @@ it saw.
 """
 
 import argparse
-import functools
-import http.server
 import pathlib
 import sys
-import threading
 
 from playwright.sync_api import expect, sync_playwright
 
 # No compiled files beside the sources.
 sys.dont_write_bytecode = True
 sys.path.append(str(pathlib.Path(__file__).parents[2] / "cli/tests/browser"))
+import folder
+from folder import LIMIT_MS, served, watched
 from pictures import LEVELS, fits, levels, looks_like
 
-# No wait takes longer, on a busy machine either.
-LIMIT_MS = 60_000
 SIDE, PATTERNS = 32, 1024
 STEPS = ["scene", "pattern", "share", "noise", "atoms", "weather", "exercises"]
 # Name, width, height and colours.
 SCREENS = [("wide", 1440, 900, "light"), ("wide-dark", 1440, 900, "dark"), ("phone", 390, 844, "light"), ("phone-dark", 390, 844, "dark")]
 
 
-class Files(http.server.SimpleHTTPRequestHandler):
-    """A plain file server. Under /missing the lesson's program is missing."""
+class Files(folder.Files):
+    """A file server. Under /missing the lesson's program is missing."""
 
     def do_GET(self):
         if self.path.startswith("/missing/"):
@@ -37,9 +34,6 @@ class Files(http.server.SimpleHTTPRequestHandler):
             if self.path.endswith("nirspi_lesson.wasm"):
                 return self.send_error(404)
         super().do_GET()
-
-    def log_message(self, *_):
-        pass
 
 
 def sign(row, pixel):
@@ -303,7 +297,7 @@ def screens(browser, base, folder):
         context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": height}, has_touch=width < 500)
         page = context.new_page()
         page.set_default_timeout(LIMIT_MS)
-        problems = watched(page)
+        _, problems = watched(page)
         opened(page, f"{base}/lesson.html")
         for _ in range(14):
             page.locator("#step").click()
@@ -322,29 +316,18 @@ def screens(browser, base, folder):
         context.close()
 
 
-def watched(page):
-    problems = []
-    page.on("pageerror", lambda error: problems.append(str(error)))
-    page.on("console", lambda said: problems.append(said.text) if said.type == "error" else None)
-    return problems
-
-
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder")
     parser.add_argument("--screenshots")
     given = parser.parse_args()
-    handler = functools.partial(Files, directory=given.folder)
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    base = f"http://127.0.0.1:{server.server_address[1]}"
+    base = served(Files, given.folder)
     expect.set_options(timeout=LIMIT_MS)
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.set_default_timeout(LIMIT_MS)
-        asked, problems = [], watched(page)
-        page.on("request", lambda request: asked.append(request.url))
+        asked, problems = watched(page)
         opened(page, f"{base}/lesson.html")
         for step in [patterns, shares, noise, atoms, weather]:
             step(page)

@@ -194,7 +194,7 @@ FAULTS = [
         "[SIDE, SIDE]",
         "controls",
     ),
-    ("the brush is always white", "scene.js", '255 * $("brush-level").value', "255", "controls"),
+    ("the brush is always white", "brush.js", '255 * slider("brush-level")', "255", "controls"),
     (
         "the saved sheet exchanges lost and corrupt frames",
         "save.js",
@@ -257,7 +257,7 @@ FAULTS = [
     ("warnings are not said", "facts.js", 'say("notes",', 'void ("notes",', "speech"),
     ("a pixel is not said at its key", "display.js", "answer($(`${panel.id}-value`).textContent);", "", "speech"),
     ("the drawing is not the scene", "scene.js", "draw(scene, drawing, moment);", "", "scene"),
-    ("a stroke is drawn over", "scene.js", " || last || sending || asked ||", " ||", "scene"),
+    ("a stroke is drawn over", "scene.js", " || isDrawing() || sending || asked ||", " ||", "scene"),
     ("a page without its script shows its controls", "index.html", "<main data-live hidden>", "<main data-live>", "dead"),
     ("the stop button looks alive without its script", "index.html", '<button id="stop" disabled', '<button id="stop"', "dead"),
     ("a page that loads goes on saying that it did not", "main.js", 'document.querySelectorAll(".dead")', "[]", "dead"),

@@ -379,3 +379,12 @@ fn the_files_of_other_benches_are_inspected_and_their_form_is_the_first() {
         assert!(told, "{outcome:?}");
     }
 }
+
+/// The picture of the ways is signed by what the file says of itself.
+#[test]
+fn a_simulated_file_is_called_simulated() {
+    let bench = Bench::new();
+    bench.run(&["example", "wing", "--out", "wing.npz"]).succeeded();
+    let report = bench.run(&["inspect", "wing.npz", "--json"]).succeeded().json();
+    assert_eq!(report["provenance"]["origin"], "simulated");
+}

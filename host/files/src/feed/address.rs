@@ -169,7 +169,7 @@ impl Source for Listening {
 }
 
 impl Address {
-    /// Opens the address, as far as that needs nobody at its other end.
+    /// Opens the address without waiting for a program at its other end.
     pub(super) fn open(&self) -> Result<Box<dyn Source>, AddressError> {
         let open = || -> io::Result<Box<dyn Source>> {
             match self {
@@ -222,7 +222,7 @@ fn at_path(path: &Path) -> io::Result<Box<dyn Source>> {
     Ok(Box::new(Waiting(path.to_owned(), None)))
 }
 
-/// Reads until the end, an error, or until nobody wants more. `give` returns whether more is wanted.
+/// Reads until the end, an error, or until `give` returns false, because the receiver wants no more.
 pub(super) fn pump(
     mut source: Box<dyn Source>,
     closed: &AtomicBool,

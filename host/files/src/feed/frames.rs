@@ -211,7 +211,7 @@ impl Frames {
         (self.taken, self.sum, self.marred) = (0, 0.0, false);
     }
 
-    /// One number that is none. The reading counts as not read.
+    /// Takes the place of one number that could not be read as a number. The reading counts as not read.
     fn refuse(&mut self, shown: &str) {
         self.account.refused += 1;
         if self.account.first_refused.is_none() {

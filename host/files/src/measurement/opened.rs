@@ -290,7 +290,7 @@ fn read_noise(fields: &mut Fields) -> Option<f64> {
 }
 
 /// Whether the file says that no real light was measured. A field of another kind says nothing.
-pub(super) fn read_simulated(fields: &mut Fields) -> Option<bool> {
+pub(crate) fn read_simulated(fields: &mut Fields) -> Option<bool> {
     const FIELD: &str = "simulated";
     if fields.is_unnamed() || !fields.holds(FIELD) {
         return None;

@@ -29,7 +29,7 @@ impl Sweeps {
     /// Sweeps of these rows, in this form. Messages name `origin`.
     ///
     /// # Errors
-    /// [`FileError`] if the rows do not fit the side, or there are none.
+    /// [`FileError`] if there are no rows, or if the rows do not fit the side.
     pub fn new(
         origin: &Path,
         side: Side,

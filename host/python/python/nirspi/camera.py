@@ -303,7 +303,7 @@ class Camera:
         """The next ``n`` frames as they come; without ``n``, until the iterator is closed.
 
         Up to 1024 frames of a virtual camera wait for a slow program, and then its time waits, too.
-        Of a real camera 65 536 frames wait; further ones are passed over and counted.
+        Of a real camera up to 65 536 frames wait; any further frame is left out and counted as passed over.
 
         Examples
         --------

@@ -77,7 +77,7 @@ def reconstruct(
     Parameters
     ----------
     measurement : Measurement or path
-        The path of a file stands for ``nirspi.load(path, index=index, **source)``. With
+        A path is opened by ``nirspi.load(path, index=index, **source)``. With
         ``index="all"``, the measurements of a file are read while they are reconstructed: the memory
         holds a few of them at a time. Or, with ``matrix``, the readings ``(..., M)``.
     method : str

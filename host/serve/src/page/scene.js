@@ -1,5 +1,6 @@
 // The scene of the virtual camera: a letter, a drawing, a picture; distance and weather.
 
+import { drawable } from "./brush.js";
 import { $, foreign, text } from "./dom.js";
 import { post } from "./requests.js";
 import { answer, say } from "./speech.js";
@@ -7,7 +8,7 @@ import { answer, say } from "./speech.js";
 const SIDE = 64;
 const canvas = $("drawing"), pen = canvas.getContext("2d", { willReadFrequently: true });
 canvas.width = canvas.height = SIDE;
-let brush = [SIDE / 2, SIDE / 2], last = null, sending = 0;
+let sending = 0;
 // The scene that is drawn, unless a person has drawn since; commands under way; when the last one was answered.
 let drawn = null, asked = 0, answered = -Infinity;
 
@@ -42,47 +43,10 @@ function soon() {
   sending = setTimeout(drawing, 300);
 }
 
-function paint(from, to) {
-  drawn = null;
-  const level = Math.round(255 * $("brush-level").value);
-  pen.strokeStyle = `rgb(${level} ${level} ${level})`;
-  pen.lineWidth = Number($("brush-size").value);
-  pen.lineCap = "round";
-  pen.beginPath();
-  pen.moveTo(...from);
-  pen.lineTo(to[0] + .01, to[1]);
-  pen.stroke();
-  soon();
-}
-
-// Where the canvas was when the pen came down: a page that moves meanwhile does not bend the stroke.
-let box = null;
-const at = event => [(event.clientX - box.left) / box.width * SIDE, (event.clientY - box.top) / box.height * SIDE];
-canvas.onpointerdown = event => {
-  canvas.setPointerCapture(event.pointerId);
-  box = canvas.getBoundingClientRect();
-  last = at(event);
-  paint(last, last);
-};
-canvas.onpointermove = event => {
-  if (last === null) return;
-  const to = at(event);
-  paint(last, to);
-  last = to;
-};
-canvas.onpointerup = canvas.onpointercancel = () => { last = null; };
-
-const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-canvas.onkeydown = event => {
-  const step = STEPS[event.key];
-  if (event.key !== " " && event.key !== "Enter" && !step) return;
-  event.preventDefault();
-  const from = brush;
-  if (step) brush = brush.map((was, axis) => Math.max(0, Math.min(SIDE - 1, was + 2 * step[axis])));
-  if (!step || event.shiftKey) paint(from, brush);
-  text($("drawing-says"), `brush at row ${brush[1]}, column ${brush[0]}`);
-  answer($("drawing-says").textContent);
-};
+const isDrawing = drawable(canvas, pen, SIDE, 2, () => { drawn = null; soon(); }, words => {
+  text($("drawing-says"), words);
+  answer(words);
+});
 
 $("clear").onclick = () => { clear(); soon(); };
 $("letter-form").onsubmit = event => {
@@ -111,7 +75,7 @@ $("picture").onchange = async () => {
 
 // Draws the scene that is before the camera, unless a person draws or has asked for another one.
 function draw(scene, levels, moment) {
-  if (!levels || levels === drawn || scene.changing || last || sending || asked || moment[0] < answered) return;
+  if (!levels || levels === drawn || scene.changing || isDrawing() || sending || asked || moment[0] < answered) return;
   drawn = levels;
   const pixels = new ImageData(SIDE, SIDE), bytes = atob(levels);
   for (let at = 0; at < SIDE * SIDE; at++) pixels.data.set([...Array(3).fill(bytes.charCodeAt(at)), 255], 4 * at);
