@@ -137,3 +137,42 @@ fn the_default_loses_little_on_scenes_that_its_rule_was_not_made_with() {
     let lost = lost(&rows(&scenes::others()), 1.1);
     assert!(lost.is_empty(), "a method is better than the default:\n{}", lost.join("\n"));
 }
+
+/// The most correlation that may be lost by showing more patterns.
+const MOST_LOST: f64 = 0.005;
+
+/// SPyRiT's Tikhonov for the shorter exposure, with 10 %, 25 % and all of the patterns.
+const SPYRIT: [(f64, f64); 3] = [(0.1, 0.888), (0.25, 0.893), (1.0, 0.895)];
+
+/// Real photons, judged by another exposure: a reading that is more noise than light must not make an image worse.
+#[test]
+#[ignore = "seconds in a release build; .ci/run does it"]
+fn more_patterns_cost_nothing_on_photon_counts() {
+    let Some(exposures) = scenes::exposures() else { return };
+    let shares = [0.1, 0.15, 0.2, 0.25, 0.5, 0.75, 1.0];
+    for (which, exposure) in exposures.iter().enumerate() {
+        // The plain transform gives all readings the same weight.
+        for (word, method) in METHODS.iter().zip(methods()).skip(1) {
+            let figures: Vec<f64> = shares
+                .par_iter()
+                .map(|share| {
+                    let some = exposure.measured.take(Some(&Order::ZigZag), *share).unwrap();
+                    let made = method.reconstruct(&some).unwrap();
+                    exposure.judge.figure(&made.image, &some)
+                })
+                .collect();
+            let mut best = 0.0_f64;
+            for (share, figure) in shares.iter().zip(&figures) {
+                best = best.max(*figure);
+                assert!(
+                    *figure >= best - MOST_LOST,
+                    "{word}, exposure {which}, {share}: {figures:.4?}"
+                );
+                let of_spyrit = SPYRIT.iter().find(|(of, _)| of == share && which == 0);
+                if let (Some((_, spyrit)), "auto") = (of_spyrit, *word) {
+                    assert!(*figure >= spyrit - MOST_LOST, "{share}: {figures:.4?}");
+                }
+            }
+        }
+    }
+}

@@ -20,6 +20,8 @@ pub struct Measurements {
     rows: Rows,
     values: Vec<f64>,
     noise: Option<f64>,
+    /// What the noise of a value is at most, if sums of patterns and complements say it.
+    most_noise: Option<f64>,
     kind: Option<Kind>,
 }
 
@@ -88,7 +90,7 @@ impl Measurements {
     pub fn from_differential(rows: &Rows, d: &[f64]) -> Result<Self, MeasurementError> {
         expect_length("d", d.len(), rows.len())?;
         expect_finite("d", d)?;
-        Ok(Self { rows: rows.clone(), values: d.to_vec(), noise: None, kind: None })
+        Ok(Self::trusted(rows.clone(), d.to_vec()))
     }
 
     /// Measurements from readings of the positive patterns alone (light where `H` is +1):
@@ -110,7 +112,7 @@ impl Measurements {
         };
         let values: Vec<f64> = y.iter().map(|y| 2.0 * y - all_ones).collect();
         expect_finite("d", &values)?;
-        Ok(Self { rows: rows.clone(), values, noise: None, kind: None })
+        Ok(Self::trusted(rows.clone(), values))
     }
 
     /// Removes the effect of a dark level in every reading (ambient light, an ADC's offset) from
@@ -151,7 +153,7 @@ impl Measurements {
 
     /// Measurements that are known to be one finite value for each row.
     pub(crate) fn trusted(rows: Rows, values: Vec<f64>) -> Self {
-        Self { rows, values, noise: None, kind: None }
+        Self { rows, values, noise: None, most_noise: None, kind: None }
     }
 
     /// Replaces the value at a position by a finite one.
@@ -162,7 +164,7 @@ impl Measurements {
     /// The measurements at these positions, in that order.
     pub(crate) fn subset(&self, positions: impl IntoIterator<Item = usize>) -> Self {
         let (rows, values) = positions.into_iter().map(|k| (self.rows[k], self.values[k])).unzip();
-        Self { rows: Rows::trusted(self.side(), rows), values, noise: self.noise, kind: self.kind }
+        Self { rows: Rows::trusted(self.side(), rows), values, ..*self }
     }
 
     /// These measurements with the standard deviation of the noise of one value, in the values'
@@ -179,6 +181,18 @@ impl Measurements {
         }
         self.noise = Some(noise);
         Ok(self)
+    }
+
+    /// The same measurements, whose noise is at most this standard deviation by what else was seen of
+    /// their readings.
+    #[must_use]
+    pub(crate) fn with_most_noise(self, most_noise: Option<f64>) -> Self {
+        Self { most_noise, ..self }
+    }
+
+    /// What the noise of a value is at most, by the sums of patterns and complements.
+    pub(crate) fn most_noise(&self) -> Option<f64> {
+        self.most_noise
     }
 
     /// The same measurements, of a kind of which this is known.

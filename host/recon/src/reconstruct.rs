@@ -400,6 +400,8 @@ struct Problem<'a> {
     /// Noise of a reading, unless it is still to be estimated. `prior.noise` also holds detail that
     /// the prior does not expect.
     reading_noise: Option<f32>,
+    /// What the noise of a reading is at most, if more than the readings themselves says so.
+    most_noise: Option<f64>,
     /// Norm of the residual, relative to the measurements' norm, at which a pursuit stops.
     residual: f64,
     /// The noise at which a pursuit also stops; 0 for none.
@@ -422,7 +424,8 @@ impl<'a> Problem<'a> {
         let in_units = |sigma: f64| (sigma / n / unit) as f32;
         let of_kind =
             |kind: Kind| Statistics { noise: in_units(kind.noise), falloff: kind.falloff };
-        let alone = || falloff.is_none().then(|| Statistics::of(rows, &values));
+        let most_noise = measurements.most_noise().map(|most| most / n / unit);
+        let alone = || falloff.is_none().then(|| Statistics::of(rows, &values, most_noise));
         let statistics = measurements.kind().map(of_kind).or_else(alone);
         let (noise, reading_noise) = match noise {
             NoiseLevel::Known(sigma) => (in_units(sigma), Some(in_units(sigma))),
@@ -437,7 +440,19 @@ impl<'a> Problem<'a> {
         let prior = Prior { scale, noise, visibility: 0.0 };
         let how = How { non_negative: false, backend: Backend::Auto };
         let (residual, to_noise) = (0.0, 0.0);
-        Self { side, rows, values, unit, transform, prior, reading_noise, residual, to_noise, how }
+        Self {
+            side,
+            rows,
+            values,
+            unit,
+            transform,
+            prior,
+            reading_noise,
+            most_noise,
+            residual,
+            to_noise,
+            how,
+        }
     }
 
     fn new(measurements: &'a Measurements, settings: &OmpSettings) -> Self {
@@ -457,8 +472,9 @@ impl<'a> Problem<'a> {
             NoiseLevel::Known(sigma) => Some(sigma),
             NoiseLevel::Estimated => measurements.noise().or_else(of_kind),
         };
-        self.reading_noise =
-            noise.map(|sigma| (sigma / self.side.pixels() as f64 / self.unit) as f32);
+        let n = self.side.pixels() as f64;
+        self.reading_noise = noise.map(|sigma| (sigma / n / self.unit) as f32);
+        self.most_noise = measurements.most_noise().map(|most| most / n / self.unit);
     }
 
     /// Measurements of the same rows, in units of this problem.
@@ -486,7 +502,7 @@ impl<'a> Problem<'a> {
     }
 
     fn reading_noise(&self) -> f32 {
-        let estimated = || Statistics::of(self.rows, &self.values).noise;
+        let estimated = || Statistics::of(self.rows, &self.values, self.most_noise).noise;
         self.reading_noise.unwrap_or_else(estimated)
     }
 

@@ -150,6 +150,11 @@ pub fn of_the_table() -> Vec<Kind> {
     kinds
 }
 
+/// Two exposures of one scene, each judged by the other; `None` where this machine has none.
+pub fn exposures() -> Option<Vec<Measured>> {
+    Some(photon_counts(&data()?))
+}
+
 /// Kinds that the default's rule was not made with.
 pub fn others() -> Vec<Kind> {
     let mut kinds = vec![
@@ -288,8 +293,7 @@ fn natural(data: &Path, noise: f64, first: usize) -> Vec<Measured> {
     unseen.skip(first).step_by(3).take(6).map(measured).collect()
 }
 
-/// Two exposures of one scene, each judged by the other. The program does not read this form, (1024, 2): a pattern and its
-/// complement in each row.
+/// Two exposures of one scene, each judged by the other: a pattern and its complement in each row.
 fn photon_counts(data: &Path) -> Vec<Measured> {
     let rows = Rows::natural(Side::new(SIDE as u64).unwrap());
     let [short, long] = ["photon_40ms.npy", "photon_80ms.npy"].map(|name| {

@@ -132,7 +132,40 @@ pub(super) fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Meas
     {
         measurements.replace(at, difference);
     }
+    let most_noise = most_noise(rows, pairs, |k| !lost[k]);
+    let measurements = measurements.with_most_noise(most_noise);
     Ok(Reading { measurements, dropouts, outliers, doubts, dark_level: None })
+}
+
+/// Fewest pairs whose sums say something of the noise.
+const FEWEST_SUMS: usize = 32;
+
+/// Share of the sums by which sums change that are no measurement: rounding.
+const COMPUTED: f64 = 1e-6;
+
+/// What the noise of a difference is at most. A pattern and its complement share all the light, so
+/// that their sum changes by noise alone, and the noise of a sum is that of a difference. A lamp that
+/// drifts or flickers changes sums more than differences, and a mirror array collects more light of
+/// coarse patterns; so changes from one fine pattern to the next count, in time or in fineness,
+/// whichever are smaller. `None` of few pairs, and where one reading of each was computed from the
+/// other.
+fn most_noise(rows: &Rows, pairs: &[[f64; 2]], keep: impl Fn(usize) -> bool) -> Option<f64> {
+    let kept: Vec<usize> =
+        order::positions_by_sequency(rows).into_iter().filter(|&k| keep(k)).collect();
+    let fine = &kept[kept.len() / 2..];
+    if fine.len() < FEWEST_SUMS {
+        return None;
+    }
+    let mut in_time = fine.to_vec();
+    in_time.sort_unstable();
+    let sum = |k: usize| pairs[k][0] + pairs[k][1];
+    let noise = |order: &[usize]| {
+        let changes = order.windows(2).map(|two| (sum(two[1]) - sum(two[0])).abs());
+        deviation(changes) / std::f64::consts::SQRT_2
+    };
+    let most = noise(fine).min(noise(&in_time));
+    let level = median(fine.iter().map(|&k| sum(k).abs()).collect());
+    (most > COMPUTED * level).then_some(most)
 }
 
 /// The difference of each kept pair.

@@ -450,3 +450,30 @@ fn doubts_say_numbers_and_what_to_do() {
         assert_eq!(doubt::Short(value).to_string(), text);
     }
 }
+
+/// A lamp that drifts and mirrors that collect more light of coarse patterns change sums, and are no
+/// noise of differences.
+#[test]
+fn sums_of_pairs_say_what_the_noise_is_at_most() {
+    let rows = shown(&Order::ZigZag, 32);
+    for kind in [1, 2] {
+        for (sigma, drift) in [(2e-3, 0.0), (2e-3, -0.2), (2e-2, 0.1)] {
+            let y = recorded(&rows, kind, drift, 0.3, Noise::Normal { sigma, seed: 5 });
+            let found = Measurements::from_pairs(&rows, &y).unwrap().measurements;
+            let ratio = found.most_noise().unwrap() / (2.0_f64.sqrt() * sigma);
+            assert!((0.85..1.25).contains(&ratio), "kind {kind}, {sigma}, {drift}: {ratio}");
+        }
+    }
+    // The second reading was computed from the first: the sums know nothing of the noise.
+    let one = readings(side(32), &rows, &scene(side(32), 1));
+    let total = one[0] + one[1];
+    let computed: Vec<f64> =
+        one.as_chunks::<2>().0.iter().flat_map(|y| [y[0], total - y[0]]).collect();
+    assert_eq!(most_noise_of(&rows, &computed), None);
+    // A few pairs say nothing.
+    assert_eq!(most_noise_of(&rows.first(40), &quiet(&rows, 1)[..80]), None);
+}
+
+fn most_noise_of(rows: &Rows, y: &[f64]) -> Option<f64> {
+    Measurements::from_pairs(rows, y).unwrap().measurements.most_noise()
+}

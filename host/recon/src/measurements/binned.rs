@@ -23,11 +23,13 @@ impl Measurements {
         let coarse = self.rows.iter().zip(&self.values);
         let coarse = coarse.filter_map(|(&of, value)| Some((row(of)?, value / area)));
         let (rows, values): (Vec<u32>, Vec<f64>) = coarse.unzip();
-        let noise = self.noise.map(|noise| noise / area);
+        let [noise, most_noise] =
+            [self.noise, self.most_noise].map(|of| of.map(|sigma| sigma / area));
         (!rows.is_empty()).then(|| Self {
             rows: Rows::trusted(side, rows),
             values,
             noise,
+            most_noise,
             kind: None,
         })
     }

@@ -92,6 +92,7 @@ impl ShorterSweep {
         let values = positions.iter().map(|&k| values[k]).collect();
         Measurements {
             noise: measurements.noise(),
+            most_noise: measurements.most_noise(),
             ..Measurements::trusted(self.shown.clone(), values)
         }
     }

@@ -12,6 +12,11 @@
 //! readings do not tell one noise from another, and too small an estimate keeps some noise, but too
 //! large a one throws readings away.
 //!
+//! Where patterns were shown with their complements, the sums of pairs say what the noise is at most
+//! (`law::pairs`). Then the estimate is the largest noise that both the sums and the readings allow:
+//! 200 of 1024 photon counts, which alone fit a scene without noise as well, have the noise that all
+//! of them have.
+//!
 //! With `l = sigma^2 / a` the logarithm of the likelihood of the best `a` is, up to a constant,
 //! `-(M ln(y^T (K + l I)^-1 y) + ln det(K + l I)) / 2`. Both terms are sums over the eigenvalues of
 //! `K`, which a few steps of Lanczos' method find well enough for every `l` at once: from `y` for
@@ -69,7 +74,8 @@ pub(super) fn estimated(measurements: &Measurements) -> Kind {
         return Kind { noise: 0.0, falloff: 1.0 };
     }
     let values: Vec<f32> = measurements.values().iter().map(|v| (v / largest) as f32).collect();
-    let Statistics { noise, falloff } = Statistics::of(measurements.rows(), &values);
+    let most = measurements.most_noise().map(|most| most / largest);
+    let Statistics { noise, falloff } = Statistics::of(measurements.rows(), &values, most);
     Kind { noise: f64::from(noise) * largest, falloff }
 }
 
@@ -91,8 +97,9 @@ pub(super) struct Statistics {
 }
 
 impl Statistics {
-    /// The statistics of readings of which the largest is about 1.
-    pub fn of(rows: &Rows, values: &[f32]) -> Self {
+    /// The statistics of readings of which the largest is about 1. `most` is what the noise is at most by
+    /// other evidence.
+    pub fn of(rows: &Rows, values: &[f32], most: Option<f64>) -> Self {
         let mut tried = Vec::new();
         for falloff in FALLOFFS {
             let Some(evidence) = Evidence::new(rows, values, falloff) else {
@@ -105,12 +112,17 @@ impl Statistics {
         let sum: f64 = tried.iter().map(|(likelihood, _)| weight(likelihood)).sum();
         let falloff = tried.iter().map(|(l, falloff)| weight(l) * falloff).sum::<f64>() / sum;
         tried.sort_by(|(a, _), (b, _)| a.variance.total_cmp(&b.variance));
-        let mut below = 0.0;
-        let noise = tried.iter().find(|(likelihood, _)| {
-            below += weight(likelihood);
-            below >= CAUTION * sum
-        });
-        let noise = noise.map_or(0.0, |(l, _)| l.variance.sqrt() as f32);
+        // The noise that is smaller than the true one with this probability.
+        let at = |probability: f64| {
+            let mut below = 0.0;
+            let found = tried.iter().find(|(likelihood, _)| {
+                below += weight(likelihood);
+                below >= probability * sum
+            });
+            found.map_or(0.0, |(l, _)| l.variance.sqrt())
+        };
+        let least = at(CAUTION);
+        let noise = most.map_or(least, |most| most.min(at(1.0 - CAUTION))) as f32;
         Self { noise: noise.min(SLACK * of_the_quiet(rows, values)), falloff }
     }
 }
@@ -348,6 +360,27 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn sums_of_pairs_tell_the_noise_of_few_patterns() {
+        let rows = Order::ZigZag.rows(side(32)).unwrap();
+        for (kind, share, least) in [(1, 0.15, 0.3), (1, 0.3, 0.15), (2, 0.3, 0.6), (2, 0.5, 1.0)] {
+            for noise in [0.05, 0.1] {
+                let readings = noisy(&rows, &scene(side(32), kind), 32.0 * noise, 3);
+                let part = readings.take(None, share).unwrap();
+                let told = part.clone().with_most_noise(Some(1.2 * 32.0 * noise));
+                let [alone, told] = [part, told].map(|part| estimated_noise(&part) / 32.0 / noise);
+                let said = format!("kind {kind}, {share}, {noise}: {alone}, {told}");
+                assert!((least..1.21).contains(&told), "{said}");
+                // Edges that alone look like noise are not more than the sums allow.
+                assert!(told >= alone.min(1.2), "{said}");
+            }
+        }
+        // What the readings do not allow, a lamp that flickers does not make noise.
+        let quiet = noisy(&rows, &scene(side(32), 1), 0.0, 3);
+        let flickers = quiet.with_most_noise(Some(32.0 * 0.2));
+        assert!(estimated_noise(&flickers) < 32.0 * 0.02, "{}", estimated_noise(&flickers));
     }
 
     #[test]

@@ -1,5 +1,5 @@
 use super::*;
-use crate::reconstruct::{Method, MethodSettings, Reconstruct, stack};
+use crate::reconstruct::{Method, MethodSettings, Reconstruct, WITHIN, stack};
 use crate::testing::{measured, noisy, normal, scene, side};
 use crate::{Order, fwht as walsh};
 use proptest::prelude::*;
@@ -136,7 +136,7 @@ proptest! {
             let made = ready(Oracle { truth, seed }).reconstruct(&part).unwrap();
             let found = coefficients(&made.image);
             let rounding = 2e-6 * part.values().iter().fold(0.0_f64, |m, v| m.max(v.abs())) * 32.0;
-            let within = 2.0 * made.report.noise.unwrap() + rounding;
+            let within = f64::from(WITHIN) * made.report.noise.unwrap() + rounding;
             for (&row, value) in part.rows().iter().zip(part.values()) {
                 prop_assert!((found[row as usize] - value).abs() <= within);
             }
