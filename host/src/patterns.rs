@@ -212,7 +212,7 @@ mod tests {
             let table = read_order_table(&folder.path().join("order.txt")).unwrap();
             assert_eq!(table, *rows);
             let header: Header = written.header.parse().unwrap();
-            assert_eq!((header.rows, header.form), (rows.to_vec(), Form::Pairs));
+            assert_eq!((header.hadamard().unwrap().1, header.form), (&rows[..], Form::Pairs));
         }
     }
 

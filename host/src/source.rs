@@ -4,7 +4,10 @@ use crate::account::LossCounters;
 use crate::calibration::{FlatField, KeptFlatField};
 use crate::capture::Capture;
 use crate::files::FileError;
-use crate::files::measurement::{self, Form, MeasurementFile, Readings, Reference, Selection};
+use crate::files::feed::{Header, OwnPatterns};
+use crate::files::measurement::{
+    self, Form, MeasurementFile, Readings, Reference, Selection, Sweeps,
+};
 use crate::integrate::IntegrateError;
 use crate::moving::followed;
 use crate::provenance::Taken;
@@ -174,6 +177,9 @@ pub enum SourceError {
     /// The file cannot be read as a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A feed of patterns of the bench's own.
+    #[error(transparent)]
+    OwnPatterns(#[from] OwnPatterns),
     /// The readings are not valid measurements.
     #[error("{}", .path.display())]
     Measurements {
@@ -306,6 +312,21 @@ impl Source {
     /// As [`read`](Self::read).
     pub fn of_sweep(origin: &Path, sweep: MeasurementFile) -> Result<Self, SourceError> {
         from_file(origin, sweep, Part::default())
+    }
+
+    /// The measurements of readings of a feed with this header, which `origin` names: of a frame, or of the mean of
+    /// several.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read); and [`SourceError::OwnPatterns`] for patterns of the bench's own.
+    pub fn of_feed(
+        header: &Header,
+        origin: &Path,
+        readings: Vec<f64>,
+    ) -> Result<Self, SourceError> {
+        let (side, rows) = header.hadamard()?;
+        let sweeps = Sweeps::new(origin, side, rows, header.form, header.simulated)?;
+        Self::of_sweep(origin, sweeps.read(readings)?)
     }
 
     /// Reads all measurements of a file, or each frame of a recording.
