@@ -276,7 +276,7 @@ pub(crate) fn is_reading(value: f64) -> bool {
 }
 
 /// The form that the file states for `y`. A field of another kind says nothing.
-fn stated_form(fields: &mut Fields) -> Option<Form> {
+pub(super) fn stated_form(fields: &mut Fields) -> Option<Form> {
     fields.text(READINGS)?.parse().ok()
 }
 
