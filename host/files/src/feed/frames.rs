@@ -433,7 +433,7 @@ mod tests {
         let uneven: String =
             uneven.iter().map(|&(level, samples)| pattern(level, samples)).collect();
         let (found, account) =
-            frames(&header, [format!("0 0\n{uneven}{pause}{whole}{}", pattern(1.0, 3)).as_bytes()]);
+            frames(&header, [format!("{uneven}{pause}{whole}{}", pattern(1.0, 3)).as_bytes()]);
         assert_eq!(found, [[1.0, 2.0, 3.0, 4.0], [1.0, 2.0, 3.0, 4.0]]);
         assert_eq!(account, Account { frames: 2, cut: 1, ..Account::default() });
         // The edge of the second pattern is lost: its reading is not read. A frame whose last edges are lost ends in the pause.

@@ -10,7 +10,8 @@ pub(super) struct Triggered {
     each: u32,
     /// The sample of the detector whose trigger comes next.
     held: Option<f64>,
-    /// Whether the trigger was below its lower level since the last edge.
+    /// Whether the trigger was below its lower level since the last edge, or the feed has just begun: a DAQ that starts with
+    /// the first pattern has no sample before its edge.
     was_low: bool,
     /// Samples since the edge of the last reading; `None` before the first edge.
     since: Option<u64>,
@@ -34,7 +35,7 @@ pub(super) enum Edge {
 
 impl Triggered {
     pub(super) fn new(levels: Trigger, each: u32) -> Self {
-        Self { levels, each, held: None, was_low: false, since: None, is_open: false }
+        Self { levels, each, held: None, was_low: true, since: None, is_open: false }
     }
 
     /// Takes a number. Returns a sample of the detector that belongs to a reading, and its edge.

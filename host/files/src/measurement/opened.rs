@@ -244,7 +244,11 @@ impl Loaded<'_> {
             places,
             not_read,
             overloads,
-            claim: Claim { form: opened.form, side_guessed: opened.side_guessed },
+            claim: Claim {
+                form: opened.form,
+                side_guessed: opened.side_guessed,
+                divide_by_sums: opened.remedy.divide_by_sums,
+            },
             remedy: opened.remedy,
             patterns: count,
             reference: opened.reference(index),
