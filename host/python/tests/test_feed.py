@@ -100,6 +100,13 @@ def test_a_generator_gives_frames_however_its_blocks_are_cut():
         assert np.allclose(found, np.tile(y, (2, 1)), rtol=1e-6)
 
 
+def test_a_block_of_many_frames_is_taken_whole():
+    # More than waits between the program and the feed.
+    y = volts()
+    with ns.Feed([y[:100].tolist() + [0.5], np.tile(y, 3000)[101:]], n=N, order=ROWS) as feed:
+        assert sum(1 for _ in feed) == 3000 and feed.account == ns.FeedAccount(frames=3000)
+
+
 def test_a_generator_is_asked_for_no_more_than_a_frame_needs_and_is_closed():
     asked, ended = [], []
 

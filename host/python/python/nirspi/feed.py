@@ -19,6 +19,8 @@ from .measurement import Measurement, _of_loaded
 
 # The longest wait between two looks whether a page is still served.
 _TICK_S = 0.05
+# Numbers that are given together at most: a block of the compiled part.
+_BLOCK = 8192
 # Single numbers are given together, after this time at the latest, or when a frame is complete.
 _TOGETHER_S = 0.02
 
@@ -125,7 +127,7 @@ class Feed(Iterable[FeedFrame]):
         simulated: bool | None = None,
     ) -> None:
         self._blocks: Iterator[Any] | None = None
-        self._held: list[float] = []
+        self._waiting = np.empty(0)
         self._given = 0
         self._came = 0
         if isinstance(source, (str, os.PathLike)):
@@ -311,33 +313,33 @@ class Feed(Iterable[FeedFrame]):
                 raise TimeoutError(f"{self._feed.name}: no frame for {timeout} s")
 
     def _pull(self, blocks: Iterator[Any]) -> bool:
-        """Gives the next readings of this program to the feed. Returns whether there may be more."""
-        began = time.monotonic()
-        while True:
-            try:
-                block = next(blocks)
-            except StopIteration:
-                self._give_held()
+        """Gives some readings of this program to the feed: never more than the feed takes before it is asked
+        for a frame. Returns whether there may be more."""
+        if not len(self._waiting):
+            found = self._block(blocks)
+            if found is None:
                 self._feed.end()
                 self._blocks = None
                 return False
-            if isinstance(block, (float, int)) and not isinstance(block, bool):
-                self._held.append(block)
-                # A frame that is complete, and numbers that were held for long, must not wait for more.
-                whole = (self._given + len(self._held)) % self._each == 0
-                if not whole and time.monotonic() - began < _TOGETHER_S:
-                    continue
-                return self._give_held()
-            numbers = _arrays.flat(np.asarray(block), "a block of readings", np.float64)
-            return self._give_held() and self._give(numbers)
+            self._waiting = found
+        some, self._waiting = self._waiting[:_BLOCK], self._waiting[_BLOCK:]
+        self._given += len(some)
+        return self._feed.give(some)
 
-    def _give_held(self) -> bool:
-        held, self._held = self._held, []
-        return self._give(np.asarray(held, np.float64)) if held else True
-
-    def _give(self, numbers: np.ndarray) -> bool:
-        self._given += len(numbers)
-        return self._feed.give(numbers)
+    def _block(self, blocks: Iterator[Any]) -> np.ndarray | None:
+        """The next readings of this program; None after the last. Single numbers come together."""
+        began = time.monotonic()
+        numbers: list[float] = []
+        for block in blocks:
+            if not isinstance(block, (float, int)):
+                more = _arrays.flat(np.asarray(block), "a block of readings", np.float64)
+                return np.concatenate([np.asarray(numbers, np.float64), more])
+            numbers.append(block)
+            # A frame that is complete, and numbers that came long ago, must not wait for more.
+            whole = (self._given + len(numbers)) % self._each == 0
+            if whole or time.monotonic() - began > _TOGETHER_S:
+                break
+        return np.asarray(numbers, np.float64) if numbers else None
 
     def _warn(self) -> None:
         missing = self._feed.missing()
