@@ -284,5 +284,6 @@ def test_sums_of_pairs_correct_a_lamp_that_drifts(tmp_path, random):
     corrected = ns.load(tmp_path / "drifts.npz", divide_by_sums=True)
     assert not any("the lamp drifts" in note for note in corrected.notes)
     steady = ns.Measurement(y=y, rows=rows, n=16)
-    ratio = corrected.d[1:] / steady.d[1:]
-    assert np.allclose(ratio[np.abs(steady.d[1:]) > 1], 1.2, rtol=1e-3)
+    seen = np.abs(steady.d) > 1
+    seen[0] = False
+    assert seen.sum() > 10 and np.allclose(corrected.d[seen], 1.2 * steady.d[seen], rtol=1e-3)

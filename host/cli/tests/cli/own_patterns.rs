@@ -58,6 +58,35 @@ fn sets_of_patterns_have_names() {
     let said = bench.run(&[&image[..], &["--method", "pseudo-inverse", "--out", "s"]].concat());
     assert!(said.succeeded().stdout.contains("s.txt: 3 x 5, 15 of 15 patterns"));
     assert!(close(&bench.pixels("s/image.npy"), &scene[..15], 0.01));
+    // `order` writes the patterns of a set, which give the same image as a file.
+    for (set, more, file) in [("s-matrix:15", &[][..], "s.txt"), ("fourier:3", &["--n", "6"], "y")]
+    {
+        let order = [&["order", set, "--out", "set"][..], more].concat();
+        bench.run(&order).succeeded();
+        if file == "y" {
+            let pixels = &scene[..36];
+            let see =
+                |row: &[f32]| row.iter().zip(pixels).map(|(w, x)| f64::from(*w) * x).sum::<f64>();
+            let y: String = bench
+                .pixels("set/patterns.npy")
+                .chunks_exact(36)
+                .map(|row| format!("{}\n", see(row)))
+                .collect();
+            bench.write(file, y.as_bytes());
+        }
+        let image = |patterns: &str, more: &[&str]| {
+            let line = ["reconstruct", file, "--matrix", patterns, "--method", "pseudo-inverse"];
+            bench.run(&[&line[..], &["--no-dark", "--out", "o"], more].concat()).succeeded();
+            bench.pixels("o/image.npy")
+        };
+        let size = if file == "y" { &["--size", "6x6"][..] } else { &[] };
+        assert!(
+            close(&image(set, size), &scene, 0.01)
+                && close(&image("set/patterns.npy", &[]), &scene, 0.01)
+        );
+    }
+    bench.run(&["order", "s-matrix:15", "--n", "8"]).failed(2, &["--n does not go with this set"]);
+    bench.run(&["order", "s-matrix:9"]).failed(2, &["s-matrix:9: expected an order up to 4095"]);
     let refused = |set: &str, words: &str| {
         bench.run(&["reconstruct", "s.txt", "--matrix", set]).failed(1, &[words]);
     };

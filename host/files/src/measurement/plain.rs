@@ -3,7 +3,7 @@
 use super::axes::joined;
 use super::called::called;
 use super::layout::Layout;
-use super::named::{NamedPatterns, read_fourier};
+use super::named::{Coefficients, NamedPatterns, read_fourier};
 use super::opened::{is_reading, read_simulated, stated_form};
 use super::patterns::{PatternArray, PatternSelection, Patterns};
 use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings_field};
@@ -45,7 +45,10 @@ pub fn read_plain(
 ) -> Result<Plain, FileError> {
     match NamedPatterns::instead_of(matrix) {
         Some(Ok(NamedPatterns::Fourier { steps })) => {
-            return read_fourier(steps, of_patterns, readings, want);
+            let Coefficients { patterns, values, not_read, simulated, notes } =
+                read_fourier(steps, of_patterns, readings, want)?;
+            let places = (0..values.len()).collect();
+            return Ok(Plain { patterns, values, places, not_read, simulated, notes, dark: false });
         }
         Some(Ok(set)) => {
             let refused = |(found, expected)| FileError::field(matrix, "--size", found, expected);

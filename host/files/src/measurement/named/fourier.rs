@@ -12,7 +12,6 @@ use crate::fields::Fields;
 use crate::measurement::called::called;
 use crate::measurement::opened::{is_reading, read_simulated};
 use crate::measurement::patterns::Patterns;
-use crate::measurement::plain::Plain;
 use crate::measurement::readings::readings_field;
 use crate::measurement::{PatternSelection, Selection};
 use crate::plain::MAX_MEMORY_BYTES;
@@ -59,6 +58,20 @@ struct Spectrum {
     values: Vec<Option<Complex>>,
 }
 
+/// Coefficients of frequencies as readings of cosines and sines, without a dark level.
+pub(in crate::measurement) struct Coefficients {
+    /// The cosines and sines.
+    pub(in crate::measurement) patterns: Patterns,
+    /// A value for each.
+    pub(in crate::measurement) values: Vec<f64>,
+    /// Frequencies that were not read.
+    pub(in crate::measurement) not_read: Vec<usize>,
+    /// Whether the file says that no real light was measured; `None` if it does not say.
+    pub(in crate::measurement) simulated: Option<bool>,
+    /// What people may not expect, one line each.
+    pub(in crate::measurement) notes: Vec<String>,
+}
+
 /// Reads the readings of Fourier patterns, or a complex spectrum, from a file.
 ///
 /// # Errors
@@ -68,7 +81,7 @@ pub(in crate::measurement) fn read_fourier(
     of_patterns: &PatternSelection,
     readings: &Path,
     want: &Selection,
-) -> Result<Plain, FileError> {
+) -> Result<Coefficients, FileError> {
     let mut fields = Fields::open(readings, want.decimal_comma)?;
     let want = &*called(&mut fields, want)?;
     let name = readings_field(&fields, want)?;
@@ -108,8 +121,7 @@ pub(in crate::measurement) fn read_fourier(
         true => format!("a spectrum of {} frequencies", area - not_read.len()),
         false => format!("{steps} steps of each frequency: constant light falls out"),
     });
-    let places = (0..values.len()).collect();
-    Ok(Plain { patterns, values, places, not_read, simulated, notes, dark: false })
+    Ok(Coefficients { patterns, values, not_read, simulated, notes })
 }
 
 /// The measurement of this index, along the first axis.
