@@ -33,13 +33,15 @@ pub(super) fn first_row(order: usize) -> Option<Vec<bool>> {
     }
     let (of_one, of_other) = (residues(one), residues(other));
     // The difference set holds multiples of the greater prime, and where both residues agree; its complement is larger.
-    let in_set =
-        |at: usize| at % other == 0 || (at % one != 0 && of_one[at % one] == of_other[at % other]);
+    let in_set = |at: usize| {
+        at.is_multiple_of(other)
+            || (!at.is_multiple_of(one) && of_one[at % one] == of_other[at % other])
+    };
     Some((0..order).map(|at| !in_set(at)).collect())
 }
 
 fn is_prime(number: usize) -> bool {
-    number >= 2 && (2..=number.isqrt()).all(|factor| number % factor != 0)
+    number >= 2 && (2..=number.isqrt()).all(|factor| !number.is_multiple_of(factor))
 }
 
 /// Which numbers below a prime are squares of others, without 0.
@@ -65,7 +67,7 @@ fn register(bits: u32) -> Vec<bool> {
 
 /// The patterns for images of this size; by default the size of this many pixels that is nearest to a square.
 pub(super) fn patterns(order: usize, size: Option<Size>) -> Result<Patterns, (String, String)> {
-    let side = (1..=order.isqrt()).rev().find(|side| order % side == 0).unwrap_or(1);
+    let side = (1..=order.isqrt()).rev().find(|&side| order.is_multiple_of(side)).unwrap_or(1);
     let size = match size {
         Some(size) if size.area() == order => size,
         Some(size) => {
