@@ -6,11 +6,12 @@
 
 use crate::files::FileError;
 use crate::files::image::encode_bits;
+use crate::files::measurement::{NamedPatterns, Patterns};
 use crate::files::npy;
 use crate::files::output::OutputDir;
 use crate::provenance::{Made, Origin, Taken};
 use nirspi_recon::law::Form;
-use nirspi_recon::{Order, RowsError, Side};
+use nirspi_recon::{Order, RowsError, Side, Size};
 use std::path::Path;
 use thiserror::Error;
 
@@ -58,6 +59,16 @@ pub enum PatternsError {
         /// The side.
         n: usize,
     },
+    /// A named set has no such patterns.
+    #[error("{set}: {found}, expected {expected}")]
+    Set {
+        /// The set.
+        set: String,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: String,
+    },
     /// Differences are of no pictures.
     #[error(
         "readings differences, expected pairs, halves or single: a projector shows no difference"
@@ -72,6 +83,31 @@ pub struct WrittenPatterns {
     pub shown: usize,
     /// The header of a feed of readings under these patterns.
     pub header: String,
+}
+
+/// Writes the patterns of a named set into a folder: `patterns.npy`, (M, height, width), float32 from 0 to 1, in the order in
+/// which they are shown, and `header.json`, the header of a feed of readings under them. Without a size, an S-matrix has the
+/// one nearest to a square.
+///
+/// # Errors
+/// [`PatternsError`], one line.
+pub fn write_set(
+    set: NamedPatterns,
+    size: Option<Size>,
+    out: &Path,
+) -> Result<WrittenPatterns, PatternsError> {
+    let refused = |(found, expected)| PatternsError::Set { set: set.to_string(), found, expected };
+    let Patterns { size, count, weights } = set.patterns(size).map_err(refused)?;
+    let (height, width) = (size.height(), size.width());
+    let weights: Vec<f32> = weights.into_iter().map(|weight| weight as f32).collect();
+    let header = format!(
+        "{{\"height\": {height}, \"width\": {width}, \"patterns\": {count}, \"readings\": \"single\"}}"
+    );
+    let mut folder = OutputDir::create(out)?;
+    folder.write("header.json", format!("{header}\n").as_bytes())?;
+    folder.write("patterns.npy", &npy::encode(&[count, height, width], &weights))?;
+    folder.commit()?;
+    Ok(WrittenPatterns { shown: count, header })
 }
 
 impl PatternSet {
@@ -212,7 +248,7 @@ mod tests {
             let table = read_order_table(&folder.path().join("order.txt")).unwrap();
             assert_eq!(table, *rows);
             let header: Header = written.header.parse().unwrap();
-            assert_eq!((header.rows, header.form), (rows.to_vec(), Form::Pairs));
+            assert_eq!((header.hadamard().unwrap().1, header.form), (&rows[..], Form::Pairs));
         }
     }
 

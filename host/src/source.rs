@@ -4,13 +4,16 @@ use crate::account::LossCounters;
 use crate::calibration::{FlatField, KeptFlatField};
 use crate::capture::Capture;
 use crate::files::FileError;
-use crate::files::measurement::{self, Form, MeasurementFile, Readings, Reference, Selection};
+use crate::files::feed::{Header, OwnPatterns};
+use crate::files::measurement::{
+    self, Form, MeasurementFile, Readings, Reference, Selection, Sweeps,
+};
 use crate::integrate::IntegrateError;
 use crate::moving::followed;
 use crate::provenance::Taken;
 use crate::recording::RecordingError;
 use crate::tally::Misfit;
-use nirspi_recon::law::{self, Doubt, Reading};
+use nirspi_recon::law::{self, Claim, Doubt, Lamp, Reading};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{
     Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, reconstruct,
@@ -174,6 +177,9 @@ pub enum SourceError {
     /// The file cannot be read as a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A feed of patterns of the bench's own.
+    #[error(transparent)]
+    OwnPatterns(#[from] OwnPatterns),
     /// The readings are not valid measurements.
     #[error("{}", .path.display())]
     Measurements {
@@ -261,6 +267,8 @@ pub struct Source {
     pub warnings: Vec<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
+    /// How steady the light was, of pairs of a file.
+    pub lamp: Option<Lamp>,
     /// The flat field of the recorded camera, if one is kept.
     pub flat_field: Option<FlatField>,
 }
@@ -308,6 +316,21 @@ impl Source {
         from_file(origin, sweep, Part::default())
     }
 
+    /// The measurements of readings of a feed with this header, which `origin` names: of a frame, or of the mean of
+    /// several.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read); and [`SourceError::OwnPatterns`] for patterns of the bench's own.
+    pub fn of_feed(
+        header: &Header,
+        origin: &Path,
+        readings: Vec<f64>,
+    ) -> Result<Self, SourceError> {
+        let (side, rows) = header.hadamard()?;
+        let sweeps = Sweeps::new(origin, side, rows, header.form, header.simulated)?;
+        Self::of_sweep(origin, sweeps.read(readings)?)
+    }
+
     /// Reads all measurements of a file, or each frame of a recording.
     ///
     /// # Errors
@@ -351,6 +374,7 @@ impl Source {
             damage: capture.missing().map(|missing| not_whole(*counters, &[missing])),
             warnings: read.doubts.iter().map(Doubt::to_string).collect(),
             notes,
+            lamp: None,
             flat_field: None,
         })
     }
@@ -457,6 +481,7 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
     }
     let mut warnings: Vec<String> = read.doubts.iter().map(Doubt::to_string).collect();
     warnings.extend(overload_words(&file.overloads));
+    warnings.extend(read.lamp.and_then(|lamp| drift_words(lamp, file.claim)));
     let complex = file.imaginary.is_some();
     let reference = file.reference.map(|Reference { real, imaginary }| {
         match (imaginary, imaginary_of(part, complex)) {
@@ -480,7 +505,19 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         damage: None,
         warnings,
         notes,
+        lamp: read.lamp,
         flat_field,
+    })
+}
+
+/// A warning about a lamp whose drift limits the image.
+fn drift_words(lamp: Lamp, claim: Claim) -> Option<String> {
+    (lamp.limits && !claim.divide_by_sums).then(|| {
+        format!(
+            "the lamp drifts by {:.1} % over the sweep, which harms the image more than the noise; --divide-by-sums corrects it, \
+             if there is no ambient light",
+            100.0 * lamp.drift
+        )
     })
 }
 
@@ -544,7 +581,7 @@ fn as_they_are(rows: &Rows, readings: &Readings) -> Result<Reading, MeasurementE
         }
     };
     let (dropouts, outliers, doubts) = (Vec::new(), Vec::new(), Vec::new());
-    Ok(Reading { measurements, dropouts, outliers, doubts, dark_level })
+    Ok(Reading { measurements, dropouts, outliers, doubts, dark_level, lamp: None })
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use nirspi::files::interrupt;
 use nirspi::files::output::refuse_dash;
 use nirspi::picture::half_blocks;
 use nirspi::recording::{Split, Target};
+use nirspi::source::Source;
 use nirspi_recon::words::count;
 use nirspi_recon::{Image, Sampling};
 use std::ops::ControlFlow;
@@ -76,7 +77,7 @@ pub struct Args {
     )]
     split: Option<Split>,
     /// After the recording, make an image of its frames, enlarge and deblur the image, and write both into this folder, as
-    /// `nirspi reconstruct --enhance` does
+    /// `nirspi reconstruct --enhance` does. Of a feed, images of 32 x 32 and 64 x 64 are enlarged and deblurred
     #[arg(long, value_name = "DIR")]
     picture: Option<PathBuf>,
     #[command(flatten)]
@@ -85,9 +86,10 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(address) = args.camera.feed() {
-        let Args { frames, seconds, ref out, overwrite, report, .. } = *args;
-        let out = out.as_deref();
-        return feed::capture(&feed::Capture { address, frames, seconds, out, overwrite, report });
+        let Args { frames, seconds, overwrite, report, .. } = *args;
+        let (out, picture) = (args.out.as_deref(), args.picture.as_deref());
+        let of = feed::Capture { address, frames, seconds, out, overwrite, picture, report };
+        return feed::capture(&of);
     }
     let mut setup = args.setup.setup(Sampling::ALL, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
@@ -140,14 +142,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let report = CaptureReport::new(session.identity(), &choice, &captured)?;
     let code = say(args, &report)?;
     if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
-        let warnings =
-            super::reconstruct::picture(&captured, choice.flat_field.clone(), path, out)?;
-        for warning in warnings {
-            print::warning(warning);
+        let mut source = Source::of_capture(&captured)?;
+        if let Some(kept) = choice.flat_field.clone() {
+            source = source.with_flat_field(kept);
         }
-        if !args.report.json {
-            print::line(format_args!("picture: {}", out.join("enhanced.png").display()))?;
-        }
+        super::reconstruct::picture(source, path, out, args.report.json)?;
     }
     Ok(code)
 }

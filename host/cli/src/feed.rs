@@ -2,12 +2,13 @@
 
 use super::progress::Progress;
 use super::report::ReportArgs;
-use super::{Usage, print, provenance, settings};
-use anyhow::{Result, bail};
+use super::{Usage, print, provenance, reconstruct, settings};
+use anyhow::{Context, Result, bail};
 use nirspi::capture::{FeedProgress, FeedReport, Seconds, StopCause, record_feed};
 use nirspi::files::feed::{Address, Feed, FeedError, Recorder};
 use nirspi::files::interrupt;
 use nirspi::files::output::Existing;
+use nirspi::source::Source;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
@@ -24,12 +25,13 @@ pub struct Capture<'a> {
     pub seconds: Option<Seconds>,
     pub out: Option<&'a Path>,
     pub overwrite: bool,
+    pub picture: Option<&'a Path>,
     pub report: ReportArgs,
 }
 
 pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
-    let Capture { address, frames, seconds, out, overwrite, report } = *args;
-    refuse_others(&["frames", "seconds", "out", "overwrite"])?;
+    let Capture { address, frames, seconds, out, overwrite, picture, report } = *args;
+    refuse_others(&["frames", "seconds", "out", "overwrite", "picture"])?;
     let out = match out {
         Some(out) if out.extension().is_none_or(|extension| extension != "npz") => {
             let out = out.display();
@@ -48,7 +50,10 @@ pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
         Err(FeedError::Stopped(_)) => bail!("{address}: stopped before the header came"),
         opened => opened?,
     };
-    let provenance = feed.header().taken(address).made(provenance::made());
+    if picture.is_some() {
+        feed.header().hadamard().with_context(|| format!("--picture of {address}"))?;
+    }
+    let provenance = feed.header().taken(&address.to_string()).made(provenance::made());
     let recorder = Recorder::begin(&out, overwrite, feed.header(), &provenance)?;
     let watch = |progress: &FeedProgress<'_>| {
         bar.set(progress.account.frames);
@@ -65,6 +70,10 @@ pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
     drop(bar);
     let say = |recorded: &FeedReport| recorded.words(address).iter().try_for_each(print::line);
     report.print(&recorded, &provenance, say)?;
+    if let (Some(folder), Some(file)) = (picture, recorded.files.first()) {
+        let source = Source::of_feed(feed.header(), file, recorded.mean.readings())?;
+        reconstruct::picture(source, file, folder, report.json)?;
+    }
     match &recorded.missing {
         None => Ok(ExitCode::SUCCESS),
         Some(missing) => {

@@ -2,11 +2,11 @@
 
 use super::camera::parse_order;
 use super::report::words;
-use super::{Usage, print, provenance};
+use super::{Usage, feed, print, provenance};
 use anyhow::Result;
-use nirspi::files::measurement::Form;
-use nirspi::patterns::{PatternSet, PatternsError};
-use nirspi_recon::{Order, Side};
+use nirspi::files::measurement::{Form, NamedPatterns};
+use nirspi::patterns::{PatternSet, PatternsError, write_set};
+use nirspi_recon::{Order, Side, Size};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -16,10 +16,14 @@ use std::process::ExitCode;
 /// 00000.png, 00001.png and so on. With --npy it writes patterns.npy instead, (M, n, n / 8), 8 pixels a byte, for
 /// numpy.unpackbits. Beside them are order.txt, for --shown table:order.txt, and header.json, the first line of a feed of
 /// readings under these patterns (docs/feeds.md).
+///
+/// Of the sets fourier:3, fourier:4 and s-matrix:N (docs/own-patterns.md) it writes patterns.npy, (M, height, width), float32,
+/// and header.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi order zig-zag --n 64 --out patterns/\n\
-    \x20 nirspi order cake-cutting --n 32 --patterns 300 --scale 24 --out patterns/")]
+    \x20 nirspi order cake-cutting --n 32 --patterns 300 --scale 24 --out patterns/\n\
+    \x20 nirspi order s-matrix:255 --out patterns/")]
 pub struct Args {
     #[arg(value_name = "ORDER", help = order_help())]
     order: String,
@@ -49,6 +53,9 @@ fn order_help() -> String {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
+    if args.order.starts_with("fourier:") || args.order.starts_with("s-matrix:") {
+        return run_set(args);
+    }
     let side = Side::new(args.n).map_err(|error| Usage(format!("--n: {error}")))?;
     let set = PatternSet {
         order: parse_order("ORDER", &args.order)?,
@@ -70,5 +77,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         written.shown,
         args.out.display()
     ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes a named set. Only its size can be chosen, and only that of a Fourier set.
+fn run_set(args: &Args) -> Result<ExitCode> {
+    let usage = |error: String| Usage(format!("{}: {error}", args.order));
+    let set: NamedPatterns = args.order.parse().map_err(usage)?;
+    let is_fourier = matches!(set, NamedPatterns::Fourier { .. });
+    let taken = |name: &&str| feed::is_given(name) && !(is_fourier && **name == *"n");
+    if let Some(other) = ["n", "patterns", "readings", "scale"].iter().find(|name| taken(name)) {
+        return Err(usage(format!("--{other} does not go with this set")).into());
+    }
+    let n = usize::try_from(args.n).unwrap_or(usize::MAX);
+    let size = Size::new(n, n).map_err(|error| Usage(format!("--n: {error}")))?;
+    let written = write_set(set, is_fourier.then_some(size), &args.out)?;
+    let (shown, out) = (written.shown, args.out.display());
+    print::line(format_args!("wrote {shown} patterns (patterns.npy) and header.json to {out}"))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -12,9 +12,8 @@ use super::report::{ReportArgs, StageTimes, stages};
 use super::source::SourceArgs;
 use super::{Usage, print};
 use anyhow::Result;
-use nirspi::calibration::KeptFlatField;
-use nirspi::capture::Capture;
 use nirspi::files::output::OutputDir;
+use nirspi::imaging::Enhance;
 use nirspi::reconstruct::{OneError, OneImage, OneReport, one_image as one};
 use nirspi::source::{FirstPatterns, Index, Source};
 use nirspi_recon::{Sampling, Size};
@@ -45,11 +44,11 @@ pub struct Args {
     order: Option<String>,
     #[command(flatten)]
     method: MethodArgs,
-    /// Patterns of your own instead of Hadamard rows: a file of any format with one pattern in each row, (M, height * width),
+    /// Patterns of your own instead of Hadamard rows: fourier:3, fourier:4 or s-matrix:N; a file of any format with one pattern in each row, (M, height * width),
     /// or one picture for each pattern, (M, height, width), or a folder of PNG files. `y` in the input then has one reading
     /// for each pattern, or pattern and complement side by side, (M, 2); --readings names other forms. --strength is relative
     /// to the variance of the readings
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed", "shown", "side",
+    #[arg(long, visible_alias = "patterns", value_name = "FILE|SET", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed", "shown", "side",
           "keep_leak", "warm_start", "complements_first", "inverted", "shift", "sweeps"])]
     matrix: Option<PathBuf>,
     /// With --matrix: height and width of the image, such as 12x15, if patterns are rows and the image is no square
@@ -113,23 +112,20 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
 }
 
-/// Reconstructs and enhances the frames of a capture as one image. The folder `out` gets the files
-/// of `reconstruct --enhance`.
-pub fn picture(
-    captured: &Capture,
-    flat_field: Option<KeptFlatField>,
-    recording: &Path,
-    out: &Path,
-) -> Result<Vec<String>> {
+/// Reconstructs the measurements of a capture as one image, and enhances it if the networks take its size. The folder `out`
+/// gets the files of `reconstruct --enhance`.
+pub fn picture(source: Source, recording: &Path, out: &Path, json: bool) -> Result<()> {
     let solver = MethodArgs::default().solver(FirstPatterns::LowestSequencies, Sampling::ALL)?;
     let made = made();
-    let request = OneImage { input: recording, solver: &solver, enhance: true, out, made };
-    let mut source = Source::of_capture(captured)?;
-    if let Some(kept) = flat_field {
-        source = source.with_flat_field(kept);
-    }
+    let enhance = Enhance::takes(source.measurements.side());
+    let request = OneImage { input: recording, solver: &solver, enhance, out, made };
     let report = one_image(&request, source, stages())?;
-    Ok(report.all_warnings().cloned().collect())
+    report.all_warnings().for_each(print::warning);
+    let name = if enhance { "enhanced.png" } else { "image.png" };
+    match json {
+        true => Ok(()),
+        false => print::line(format_args!("picture: {}", out.join(name).display())),
+    }
 }
 
 fn one_image(request: &OneImage<'_>, source: Source, times: StageTimes) -> Result<OneReport> {

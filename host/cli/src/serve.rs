@@ -13,8 +13,8 @@ use nirspi::files::feed::{Address, Feed};
 use nirspi::files::{interrupt, read_small_text};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_recon::{Order, Sampling, Side};
-use nirspi_serve::settings::{MAX_FRAMES, Measuring, Settings};
+use nirspi_recon::{Sampling, Side};
+use nirspi_serve::settings::{MAX_FRAMES, Settings};
 use nirspi_serve::{
     Access, BasePath, CameraSource, Connect, Connected, FeedSource, HostName, Imaging, Server,
     StagedScene, Token, serve, serve_feed,
@@ -116,19 +116,11 @@ impl Args {
     }
 
     /// Methods and networks, and the settings with which the page begins.
-    fn imaging(
-        &self,
-        side: Side,
-        sum: u32,
-        setup: &MeasurementSetup,
-    ) -> Result<(Imaging, Settings)> {
+    fn imaging(&self, side: Side, settings: Settings) -> Result<(Imaging, Settings)> {
         let method = &self.method;
         let imaging = Imaging::new(&method.settings_for(side.pixels())?, method.device()?)?;
-        let settings = Settings {
-            strength: method.strength,
-            warm_start: self.warm_start,
-            ..Settings::new(method.method, sum, setup)
-        };
+        let settings =
+            Settings { strength: method.strength, warm_start: self.warm_start, ..settings };
         if self.warm_start {
             let refused = |why| Usage(format!("--warm-start: {why}"));
             imaging.check_warm_start(settings.method).map_err(refused)?;
@@ -157,7 +149,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     }
     let server = args.server()?;
-    let (imaging, settings) = args.imaging(Side::INSTRUMENT, sum, &setup)?;
+    let settings = Settings::new(args.method.method, sum, &setup);
+    let (imaging, settings) = args.imaging(Side::INSTRUMENT, settings)?;
     let stop = interrupt::stop_flag();
     let (address, note) = args.camera.address_and_note()?;
     let session = address::open(&address, &args.scene)?;
@@ -202,16 +195,13 @@ fn run_feed(args: &Args, address: &Address) -> Result<ExitCode> {
     let stop = interrupt::stop_flag();
     print::remark(format_args!("{address}: waiting for the header"));
     let feed = Feed::open(address, || !stop.load(Ordering::Relaxed))?;
-    let header = feed.header();
     // A bench takes longer for a frame than a camera: each frame is an image.
     let sum = if feed::is_given("sum") { args.sum } else { 1 };
-    let any = MeasurementSetup::new(&Order::Natural, 1.0)?;
-    let (imaging, settings) = args.imaging(header.side, sum, &any)?;
-    let sampling = (header.rows.len() as f64 / header.side.area() as f64).min(1.0);
-    let measuring = Measuring { order: header.order(), sampling, sweeps: 1 };
-    let settings = Settings { measuring, ..settings };
+    let source = FeedSource::at(address, feed, args.record_to.clone())
+        .with_context(|| address.to_string())?;
+    let (imaging, settings) =
+        args.imaging(source.feed.header().hadamard()?.0, source.settings(args.method.method, sum))?;
     print::line(server.invitation(address))?;
-    let source = FeedSource { address: address.clone(), feed, record_to: args.record_to.clone() };
     let served = serve_feed(server, source, imaging, settings, &stop)?;
     print::line(format_args!("stopped: {served}"))?;
     Ok(ExitCode::SUCCESS)

@@ -64,6 +64,10 @@ pub struct SourceArgs {
     /// The file holds K sweeps of the same patterns, one after another, and no h_row. Their mean is used
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     pub sweeps: Option<u32>,
+    /// Divide the difference of each pattern and its complement by their sum, which follows the lamp: against a lamp that
+    /// drifts or flickers. Ambient light makes this correction too weak
+    #[arg(long)]
+    pub divide_by_sums: bool,
     /// Which part of complex readings to show
     #[arg(long, value_name = "PART", default_value = Part::Magnitude.name(), value_parser = parts())]
     pub part: Part,
@@ -106,6 +110,7 @@ impl SourceArgs {
                 inverted: self.inverted,
                 shift: self.shift,
                 sweeps: self.sweeps.unwrap_or(0),
+                divide_by_sums: self.divide_by_sums,
             },
         })
     }

@@ -23,10 +23,11 @@ mod frames;
 mod header;
 mod record;
 mod stream;
+mod trigger;
 
 pub use account::Account;
 pub use address::{Address, AddressError};
-pub use frames::{Frames, SecondHeader, Taken};
-pub use header::{Header, HeaderError, Numbers, Samples};
+pub use frames::{Frames, Mean, SecondHeader, Taken, mean};
+pub use header::{FeedPatterns, Header, HeaderError, Numbers, OwnPatterns, Samples, Trigger};
 pub use record::{Recorded, Recorder};
-pub use stream::{End, Feed, FeedError, MAX_HEADER_BYTES, Next};
+pub use stream::{End, Feed, FeedError, Giver, MAX_HEADER_BYTES, Next};

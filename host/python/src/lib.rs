@@ -8,6 +8,7 @@
 mod arrays;
 mod camera;
 mod errors;
+mod feed;
 mod loaded;
 mod made;
 mod measurement;
@@ -32,6 +33,8 @@ mod _nirspi {
     use crate::camera::{Camera, Run};
     #[pymodule_export]
     use crate::errors::Error;
+    #[pymodule_export]
+    use crate::feed::{Feed, FeedPage, FeedRecorder};
     #[pymodule_export]
     use crate::loaded::{Loaded, load};
     #[pymodule_export]

@@ -95,7 +95,7 @@ impl Loaded {
     }
 
     /// Measurements that were read one by one, at least one.
-    fn of(py: Python<'_>, sources: Vec<Source>, several: bool) -> PyResult<Self> {
+    pub(crate) fn of(py: Python<'_>, sources: Vec<Source>, several: bool) -> PyResult<Self> {
         let first = &sources[0];
         let side = first.measurements.side();
         let rows = rows_of_any(&sources);

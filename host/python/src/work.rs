@@ -3,8 +3,8 @@
 //! # Invariant
 //! A panic is a `RuntimeError`, never the end of the interpreter (`test_bad_input.py`,
 //! `test_a_panic_is_a_runtime_error`). A child of `fork` has threads of its own (`test_a_child_of_fork_computes`): the
-//! threads of rayon's global pool do not survive a fork, so that pool is never used. The lock of [`pool`] is taken with
-//! the GIL held, and Python forks with the GIL held, so no fork finds the lock taken.
+//! threads of rayon's global pool do not survive a fork, so that only the pages of feeds use that pool. The lock of
+//! [`pool`] is taken with the GIL held, and Python forks with the GIL held, so no fork finds the lock taken.
 
 use crate::errors::refusal;
 use nirspi_nets::{Backend, Device};

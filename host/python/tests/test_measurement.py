@@ -271,3 +271,19 @@ def test_parts_and_pickles_are_measurements():
     assert (m.take(10).rows == m.rows[:10]).all()
     other = pickle.loads(pickle.dumps(m))
     assert (other.d == m.d).all() and other.n == N
+
+
+def test_sums_of_pairs_correct_a_lamp_that_drifts(tmp_path, random):
+    scene = np.add.outer(np.linspace(0, 1, 16) ** 2, np.linspace(0, 2, 16))
+    rows = ns.order("zig-zag", 16)
+    y = ns.Hadamard(16, rows=rows, split=True)(scene)
+    lamp = np.repeat(np.linspace(1, 1.4, len(rows)), 2)
+    np.savez(tmp_path / "drifts.npz", n=16, h_row=rows, y=y * lamp)
+    as_it_is = ns.load(tmp_path / "drifts.npz")
+    assert any("the lamp drifts by 33" in note for note in as_it_is.notes)
+    corrected = ns.load(tmp_path / "drifts.npz", divide_by_sums=True)
+    assert not any("the lamp drifts" in note for note in corrected.notes)
+    steady = ns.Measurement(y=y, rows=rows, n=16)
+    seen = np.abs(steady.d) > 1
+    seen[0] = False
+    assert seen.sum() > 10 and np.allclose(corrected.d[seen], 1.2 * steady.d[seen], rtol=1e-3)

@@ -17,6 +17,7 @@
 mod doubt;
 mod dropout;
 mod form;
+mod lamp;
 mod outlier;
 mod pairs;
 mod repeats;
@@ -26,6 +27,7 @@ mod signed;
 pub use doubt::{Broken, Doubt, Explanation, Extreme};
 pub use dropout::Dropout;
 pub use form::Form;
+pub use lamp::Lamp;
 pub use outlier::{Impossible, Outlier};
 pub use signed::keeps_the_law;
 
@@ -45,12 +47,15 @@ pub struct Claim {
     /// Whether the side of the image follows from the number of readings alone. Several samples of each
     /// reading, or several sweeps one after another, then look like a larger image.
     pub side_guessed: bool,
+    /// Whether each difference of a pair is divided by the sum of the pair, and multiplied by the median of the sums. It has no
+    /// meaning for other forms.
+    pub divide_by_sums: bool,
 }
 
 impl From<Form> for Claim {
     /// Readings of this form, of an image whose side is known.
     fn from(form: Form) -> Self {
-        Self { form, side_guessed: false }
+        Self { form, side_guessed: false, divide_by_sums: false }
     }
 }
 
@@ -67,6 +72,8 @@ pub struct Reading {
     pub doubts: Vec<Doubt>,
     /// The dark level that was found in readings of single patterns and removed.
     pub dark_level: Option<f64>,
+    /// How steady the light was, of pairs that are what they are said to be.
+    pub lamp: Option<Lamp>,
 }
 
 /// Measurements from finite readings of `rows`, in the order in which the patterns were shown. Pairs
@@ -92,6 +99,7 @@ pub fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Measurement
             outliers,
             doubts: vec![doubt],
             dark_level: None,
+            lamp: None,
         });
     }
     match claim.form {

@@ -6,7 +6,7 @@ use nirspi::boards;
 use nirspi::clock::{self, Instant};
 use nirspi::events::Level;
 #[cfg(feature = "server")]
-use nirspi::files::feed::{Account, Address, Header};
+use nirspi::files::feed::{Account, Header};
 use nirspi::identity::CameraIdentity;
 #[cfg(feature = "server")]
 use nirspi::provenance::{Origin, Taken};
@@ -196,9 +196,9 @@ impl CameraLog {
 
     /// The log of a feed.
     #[cfg(feature = "server")]
-    pub fn of_feed(address: &Address) -> Self {
+    pub fn of_feed(address: &str) -> Self {
         let camera = CameraState {
-            address: address.to_string(),
+            address: address.to_owned(),
             simulated: false,
             phase: Phase::Preparing,
             line: String::new(),
@@ -218,18 +218,13 @@ impl CameraLog {
     #[cfg(feature = "server")]
     pub fn fed(&mut self, header: &Header, taken: Taken) {
         self.camera.simulated = header.simulated == Some(true);
-        let line = format!(
-            "{} x {}, order {}",
-            header.side.pixels(),
-            header.side.pixels(),
-            header.order()
-        );
+        let line = format!("{}, order {}", header.size(), header.order());
         self.camera.feed = Some(FeedState {
             name: header.name.clone(),
             unit: header.unit.clone(),
-            n: header.side.pixels(),
+            n: header.size().width(),
             order: header.order(),
-            patterns: header.rows.len(),
+            patterns: header.patterns(),
             readings: header.form.name(),
             account: Account::default(),
             taken,

@@ -5,15 +5,17 @@ use super::delays::Passed;
 use super::light::Leds;
 use super::look::{Bench, Look, Seen};
 use super::rest::{RETRY, rest};
+use super::settings::{Measuring, Settings};
 use super::{ForeignError, Shared, lock};
 use nirspi::account::LossCounters;
 use nirspi::causes;
 use nirspi::clock::Instant;
 use nirspi::events::Level;
 use nirspi::files::FileError;
-use nirspi::files::feed::{Account, Address, Feed, Header, Next, Recorded, Recorder};
+use nirspi::files::feed::{Account, Address, Feed, Header, Next, OwnPatterns, Recorded, Recorder};
 use nirspi::files::measurement::Sweeps;
 use nirspi::provenance::Made;
+use nirspi_recon::reconstruct::Method;
 use nirspi_recon::words::count;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -29,50 +31,67 @@ const MOST_KEPT: usize = 256 << 20;
 
 /// A feed whose header has come.
 pub struct FeedSource {
-    /// The address, to open the feed again.
-    pub address: Address,
+    /// Where the readings come from, in words.
+    pub name: String,
     /// The feed.
     pub feed: Feed,
+    /// The address at which the feed is opened again after its end; `None` for a feed that has no other.
+    pub again: Option<Address>,
     /// The folder for recordings; `None` if pages cannot record.
     pub record_to: Option<PathBuf>,
 }
 
 impl FeedSource {
-    /// Receives until the server stops. A feed that has ended is opened again, but for the standard input, which has no
-    /// other.
+    /// The feed of an address.
+    ///
+    /// # Errors
+    /// [`OwnPatterns`], which a page cannot show.
+    pub fn at(
+        address: &Address,
+        feed: Feed,
+        record_to: Option<PathBuf>,
+    ) -> Result<Self, OwnPatterns> {
+        feed.header().hadamard()?;
+        let again = (*address != Address::Stdin).then(|| address.clone());
+        Ok(Self { name: address.to_string(), feed, again, record_to })
+    }
+
+    /// The settings with which a page of this feed begins.
+    #[must_use]
+    pub fn settings(&self, method: Method, frames: u32) -> Settings {
+        let header = self.feed.header();
+        let sampling = (header.patterns() as f64 / header.size().area() as f64).min(1.0);
+        let measuring = Measuring { order: header.order(), sampling, sweeps: 1 };
+        Settings::measuring(method, frames, measuring)
+    }
+
+    /// Receives until the server stops. A feed that has ended is opened again, if there is another.
     pub(super) fn receive(self, shared: &Arc<Shared>, made: &Made) {
-        let Self { address, feed, record_to } = self;
+        let Self { name, feed, again, record_to } = self;
         let mut receiver = Receiver {
             shared,
-            address: &address,
+            name: &name,
             made,
             record_to,
             earlier: LossCounters::default(),
             offered: 0,
             recorder: None,
         };
-        let mut next = Some(feed);
+        let mut why = receiver.one(feed);
         while !shared.is_over() {
-            let feed = match next.take() {
-                Some(feed) => Ok(feed),
-                None => Feed::open(&address, || !shared.is_over()),
-            };
-            let why = match feed {
-                Ok(feed) => receiver.one(feed),
-                Err(error) => causes::in_one_line(&error),
-            };
-            if shared.is_over() {
-                return;
-            }
-            if address == Address::Stdin {
+            let Some(address) = &again else {
                 shared.enter(Phase::Lost, Leds::None, why);
                 while !shared.is_over() {
                     rest(shared, RETRY);
                 }
                 return;
-            }
+            };
             shared.enter(Phase::Lost, Leds::None, format!("{why}; trying again"));
             rest(shared, RETRY);
+            why = match Feed::open(address, || !shared.is_over()) {
+                Ok(feed) => receiver.one(feed),
+                Err(error) => causes::in_one_line(&error),
+            };
         }
     }
 }
@@ -80,7 +99,7 @@ impl FeedSource {
 /// Receives one feed after the other from an address.
 struct Receiver<'r> {
     shared: &'r Shared,
-    address: &'r Address,
+    name: &'r str,
     made: &'r Made,
     record_to: Option<PathBuf>,
     /// The account of all earlier feeds.
@@ -108,7 +127,7 @@ impl Receiver<'_> {
     fn frames(&mut self, feed: &mut Feed) -> Result<String, ForeignError> {
         let header = feed.header().clone();
         let bench = Arc::new(self.bench(&header)?);
-        lock(&self.shared.camera).fed(&header, header.taken(self.address));
+        lock(&self.shared.camera).fed(&header, header.taken(self.name));
         let mut kept: VecDeque<Arc<[f64]>> = VecDeque::new();
         let most = (MOST_KEPT / (8 * header.readings())).max(1);
         let mut told = Instant::now();
@@ -153,9 +172,9 @@ impl Receiver<'_> {
         Ok("the server stops".to_owned())
     }
 
-    fn bench(&self, header: &Header) -> Result<Bench, FileError> {
-        let origin = PathBuf::from(self.address.to_string());
-        let (side, rows) = (header.side, &header.rows);
+    fn bench(&self, header: &Header) -> Result<Bench, ForeignError> {
+        let origin = PathBuf::from(self.name);
+        let (side, rows) = header.hadamard()?;
         let sweeps = Sweeps::new(&origin, side, rows, header.form, header.simulated)?;
         Ok(Bench { header: header.clone(), origin, sweeps })
     }
@@ -189,7 +208,7 @@ impl Receiver<'_> {
         let wanted = lock(&self.shared.settings).record;
         match (&self.record_to, wanted, self.recorder.is_some()) {
             (Some(folder), true, false) => {
-                let provenance = header.taken(self.address).made(self.made);
+                let provenance = header.taken(self.name).made(self.made);
                 let path = Recorder::first_free(folder);
                 match Recorder::begin(&path, false, header, &provenance) {
                     Ok(recorder) => self.recorder = Some(recorder),

@@ -4,7 +4,7 @@ use nirspi::account::LossCounters;
 use nirspi::calibration::FlatField;
 use nirspi::clock::Instant;
 #[cfg(feature = "server")]
-use nirspi::files::feed::Header;
+use nirspi::files::feed::{Header, mean};
 #[cfg(feature = "server")]
 use nirspi::files::measurement::Sweeps;
 use nirspi::integrate::{IntegrateError, Newest};
@@ -197,7 +197,7 @@ impl Look {
                 (setup.order.clone(), setup.rows.len(), setup.sweeps)
             }
             #[cfg(feature = "server")]
-            Seen::Feed { bench, .. } => (bench.header.order(), bench.header.rows.len(), 1),
+            Seen::Feed { bench, .. } => (bench.header.order(), bench.header.patterns(), 1),
         }
     }
 
@@ -209,19 +209,4 @@ impl Look {
             Seen::Feed { bench, .. } => bench.header.unit.clone().unwrap_or_default(),
         }
     }
-}
-
-/// The mean of each reading over the frames in which it was read; NaN where it was read in none.
-#[cfg(feature = "server")]
-fn mean(frames: &[Arc<[f64]>]) -> Vec<f64> {
-    let Some(first) = frames.first() else { return Vec::new() };
-    if frames.len() == 1 {
-        return first.to_vec();
-    }
-    let mean = |at: usize| {
-        let read = frames.iter().map(|frame| frame[at]).filter(|value| !value.is_nan());
-        let (count, sum) = read.fold((0_u32, 0.0), |(count, sum), value| (count + 1, sum + value));
-        sum / f64::from(count)
-    };
-    (0..first.len()).map(mean).collect()
 }

@@ -66,7 +66,8 @@ impl Server {
     }
 
     /// The address, with the token if there is one.
-    fn url(&self) -> String {
+    #[must_use]
+    pub fn url(&self) -> String {
         let (machine, base) = (self.machine(), &self.access.base_path);
         match (&self.access.token, base.named()) {
             (Some(token), _) => format!("http://{machine}{base}?token={token}"),

@@ -249,6 +249,11 @@ impl Settings {
     /// Sums of so many frames of this setup, each by itself, enhanced and not recorded.
     #[must_use]
     pub fn new(method: Method, frames: u32, setup: &MeasurementSetup) -> Self {
+        Self::measuring(method, frames, Measuring::of(setup))
+    }
+
+    /// As [`new`](Self::new), of what is measured.
+    pub(super) fn measuring(method: Method, frames: u32, measuring: Measuring) -> Self {
         Self {
             method: method.argument(),
             strength: None,
@@ -256,7 +261,7 @@ impl Settings {
             enhance: true,
             model: Model::DIFFUSION.name(),
             frames,
-            measuring: Measuring::of(setup),
+            measuring,
             record: false,
         }
     }

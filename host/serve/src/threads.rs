@@ -103,7 +103,7 @@ pub fn serve_feed(
     settings: Settings,
     stop: &AtomicBool,
 ) -> Result<Served, ServeError> {
-    let log = CameraLog::of_feed(&feed.address);
+    let log = CameraLog::of_feed(&feed.name);
     let records = feed.record_to.is_some();
     let offer = Offer { records, fixed: true, ..imaging.offer() };
     let shared = Arc::new(Shared::new(log, offer, settings, Stage::of(None)));

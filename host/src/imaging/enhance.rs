@@ -9,7 +9,7 @@ use nirspi_nets::{
     MeasuredRows, MeasuredRowsError, Method, Networks, NoIntervals, Options, Sharpener,
     WeightsError, deblur, fusion,
 };
-use nirspi_recon::{Image, Rows};
+use nirspi_recon::{Image, Rows, Side};
 use thiserror::Error;
 
 /// Number of simulated repetitions for the spread of an image.
@@ -164,6 +164,12 @@ impl Enhance {
         &self.device
     }
 
+    /// Whether the networks take images of this side.
+    #[must_use]
+    pub fn takes(side: Side) -> bool {
+        [fusion::SIDE, deblur::SIDE].contains(&side.pixels())
+    }
+
     /// Enhances an image of 32 x 32 or 64 x 64 pixels.
     ///
     /// # Errors
@@ -194,7 +200,7 @@ impl Enhance {
         let Some(first) = images.first() else { return Ok(Vec::new()) };
         let side = first.side().pixels();
         assert!(images.iter().all(|image| image.side() == first.side()), "images of one size");
-        if side != fusion::SIDE && side != deblur::SIDE {
+        if !Self::takes(first.side()) {
             return Err(EnhanceError::Side { found: side });
         }
         if !(white > 0.0 && white.is_finite()) {

@@ -10,9 +10,11 @@ use crate::picture::{Pictures, Unit};
 use crate::provenance::Made;
 use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
+use nirspi_recon::law::Lamp;
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Shape, metrics};
 use serde::Serialize;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -41,6 +43,28 @@ pub struct DropoutReport {
     pub rows: Vec<u32>,
 }
 
+/// How steady the light was.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LampReport {
+    /// Standard deviation of the sums of pattern and complement about their level, as a share of the level.
+    pub spread: f64,
+    /// From the lowest to the highest level during the sweep, as a share of the middle one.
+    pub drift: f64,
+}
+
+impl LampReport {
+    fn of(Lamp { spread, drift, .. }: Lamp) -> Self {
+        Self { spread, drift }
+    }
+}
+
+impl fmt::Display for LampReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (spread, drift) = (100.0 * self.spread, 100.0 * self.drift);
+        write!(f, "sums of pairs: spread {spread:.2} %, drift {drift:.2} %")
+    }
+}
+
 /// The report of one image.
 #[derive(Debug, Serialize)]
 pub struct OneReport {
@@ -65,6 +89,9 @@ pub struct OneReport {
     pub outliers: Vec<OutlierReport>,
     /// Positions in the order shown of patterns that the file marks as not read.
     pub not_read: Vec<usize>,
+    /// How steady the light was, of pairs of a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lamp: Option<LampReport>,
     /// The part of complex readings in image.npy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub part: Option<&'static str>,
@@ -110,6 +137,7 @@ impl OneReport {
         }));
         lines.extend(self.outliers.iter().map(OutlierReport::to_string));
         lines.extend((!self.not_read.is_empty()).then(|| not_read_words(&self.not_read)));
+        lines.extend(self.lamp.map(|lamp| lamp.to_string()));
         lines.extend(self.frames.map(|frames| format!("frames: {frames}")));
         lines.push(self.method.to_string());
         lines.extend(self.correlation_with_files_recon.map(|correlation| {
@@ -191,6 +219,7 @@ pub fn one_image(
         dropouts: dropouts.collect(),
         outliers: source.outliers.iter().map(OutlierReport::of).collect(),
         not_read: source.not_read,
+        lamp: source.lamp.map(LampReport::of),
         part: parts.as_ref().map(|_| Part::Magnitude.name()),
         frames: source.frames,
         correlation_with_files_recon: correlation,

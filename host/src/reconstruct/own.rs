@@ -117,8 +117,9 @@ pub enum OwnError {
 pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnReport, OwnError> {
     let OwnImage { input, matrix, mut settings, .. } = request;
     let read = || read_plain(matrix, &request.patterns, input, &request.readings);
-    let Plain { patterns, values: y, places, not_read, simulated, mut notes } =
+    let Plain { patterns, values: y, places, not_read, simulated, mut notes, dark } =
         times.time("read", read)?;
+    settings.dark &= dark;
     let size = patterns.size;
     if let Some(atoms) = request.dictionary {
         settings.atoms = Some(read_atoms(atoms, (size.height(), size.width()))?);

@@ -112,6 +112,7 @@ fn of_frames(
         damage: (!lacks.is_empty()).then(|| not_whole(counters, &lacks)),
         warnings: read.doubts.iter().map(ToString::to_string).collect(),
         notes,
+        lamp: None,
         flat_field: None,
     };
     Ok(match flat_field {

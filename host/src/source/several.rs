@@ -55,7 +55,7 @@ pub(super) fn fits_together(
     patterns: usize,
     side: Side,
 ) -> Result<(), SourceError> {
-    let most = measurement::most_together(patterns, side);
+    let most = measurement::most_together(patterns, side.area());
     match count as u64 <= most {
         true => Ok(()),
         false => Err(SourceError::TooMany { path: path.to_owned(), count, most }),

@@ -161,6 +161,68 @@ fn what_is_no_feed_is_refused_in_one_line() {
     bench.run(&["camera", "info", "--camera", "feed:-"]).failed(1, &["a feed sends readings"]);
 }
 
+/// `--picture` is the image of the mean of all frames, as `reconstruct` makes it of a file with the mean.
+#[test]
+fn the_picture_of_a_capture_is_that_of_the_mean_of_its_frames() {
+    let bench = Bench::new();
+    for n in [8, 32] {
+        let scene = Measured::new(n);
+        bench.write("file.npz", &scene.npz());
+        bench.run(&["reconstruct", "file.npz", "--out", "file"]).succeeded();
+        let doubled: Vec<f32> = scene.y.iter().map(|&reading| 2.0 * reading).collect();
+        let none: Vec<f32> = scene.y.iter().map(|_| 0.0).collect();
+        let text = [header(&scene, ""), as_text(&doubled), as_text(&none)].concat();
+        bench.write("log.txt", text.as_bytes());
+        let arguments = ["capture", "--camera", "feed:log.txt", "--frames", "2", "--overwrite"];
+        let more = ["--out", "rec.npz", "--picture", "seen"];
+        let said = bench.run(&[&arguments[..], &more].concat()).succeeded().stdout;
+        assert_eq!(bench.pixels("seen/image.npy"), bench.pixels("file/image.npy"));
+        // Networks enhance images of 32 x 32 and 64 x 64.
+        let name = if n == 32 { "enhanced.png" } else { "image.png" };
+        assert!(said.contains("picture: ") && said.contains(name), "{said}");
+        assert_eq!(bench.path("seen/enhanced.png").exists(), n == 32);
+    }
+}
+
+/// Patterns of the bench's own are recorded, and the recording is read beside the patterns.
+#[test]
+fn patterns_of_the_bench_are_recorded_and_shown_by_their_matrix() {
+    let bench = Bench::new();
+    // Of 3 x 4 pixels each pattern lights one.
+    let header =
+        r#"{"height":3,"width":4,"patterns":12,"readings":"pairs","samples":4,"trigger":2}"#;
+    let sample = |level: usize| format!("{level} 5\n{level} 0\n{level} 0\n{level} 0\n");
+    let frame: String = (0..12).map(|at| sample(20 + at) + &sample(20)).collect();
+    bench.write("log.txt", format!("{header}\n0 0\n{frame}{frame}").as_bytes());
+    let capture = ["capture", "--camera", "feed:log.txt", "--frames", "2", "--out", "rec.npz"];
+    let said = bench.run(&capture).succeeded().stdout;
+    assert!(said.contains("3 x 4, 12 patterns of its own, readings pairs"), "{said}");
+    let advice = "nirspi reconstruct rec.npz --index 0 --matrix PATTERNS --size 3x4 makes images";
+    assert!(said.contains(advice), "{said}");
+    let rows: String = (0..12)
+        .map(|at| (0..12).map(|k| if k == at { "1 " } else { "0 " }).collect::<String>() + "\n")
+        .collect();
+    bench.write("masks.txt", rows.as_bytes());
+    let image =
+        ["reconstruct", "rec.npz", "--index", "1", "--matrix", "masks.txt", "--size", "3x4"];
+    let more = ["--method", "pseudo-inverse", "--no-dark", "--out", "out"];
+    bench.run(&[&image[..], &more].concat()).succeeded();
+    // A pattern less its complement weighs each other pixel with -1.
+    let found = bench.pixels("out/image.npy");
+    let sum: f32 = found.iter().sum();
+    let differences: Vec<f32> = found.iter().map(|pixel| 2.0 * pixel - sum).collect();
+    assert!(
+        differences.iter().enumerate().all(|(at, d)| (d - at as f32).abs() < 1e-3),
+        "{found:?}"
+    );
+    let own = "the feed shows 12 patterns of its own on 3 x 4 pixels, expected Hadamard patterns";
+    let serve = ["serve", "-q", "--listen", "127.0.0.1:0", "--camera", "feed:log.txt"];
+    bench.run(&serve).failed(1, &[own]);
+    let picture = [&capture[..3], &["--out", "b.npz", "--picture", "seen"]].concat();
+    bench.run(&picture).failed(1, &["--picture of feed:log.txt: ", own]);
+    assert!(!bench.names().contains(&"b.npz".to_owned()));
+}
+
 #[cfg(unix)]
 #[test]
 fn a_capture_of_a_feed_ends_at_ctrl_c_and_keeps_its_frames() {
@@ -217,7 +279,7 @@ fn patterns_for_a_dmd_are_those_of_the_order_and_begin_a_feed() {
 fn five_lines_of_python_make_a_dmd_with_a_daq_a_feed() {
     let bench = Bench::new();
     let page = include_str!("../../../../docs/feeds.md");
-    let code = page.split("```python\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let code = page.split("```python\n").nth(3).and_then(|rest| rest.split("```").next()).unwrap();
     let commands = page.matches("python bench.py | nirspi ").count();
     assert!(code.lines().filter(|line| !line.is_empty()).count() <= 5 && commands == 2, "{code}");
     // A scene of one bright pixel: all patterns of a row light it with +1.

@@ -161,6 +161,44 @@ fn the_page_has_at_most_1500_words() {
     assert!(words <= 1500, "{words} words");
 }
 
+/// A lamp that drifts: told, warned of where it harms, and corrected by the sums of pairs.
+#[test]
+fn the_sums_of_pairs_tell_and_correct_a_lamp_that_drifts() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    bench.write("steady.npz", &measured.npz());
+    let last = measured.y.len() as f32;
+    let y: Vec<f32> =
+        (0..measured.y.len()).map(|at| measured.y[at] * (1.0 + 0.4 * at as f32 / last)).collect();
+    let drifting = Measured { y, ..Measured::new(16) };
+    bench.write("drifts.npz", &drifting.npz());
+    let image = |file: &str, more: &[&str]| {
+        let line = ["reconstruct", file, "--method", "hadamard", "--out", "out"];
+        let told = bench.run(&[&line[..], more].concat()).succeeded();
+        let lamp = bench.json("out/report.json")["lamp"].clone();
+        (bench.pixels("out/image.npy"), told, lamp)
+    };
+    let (truth, told, lamp) = image("steady.npz", &[]);
+    assert!(told.stdout.contains("sums of pairs: spread ") && told.stderr.is_empty(), "{told:?}");
+    assert!(lamp["drift"].as_f64().unwrap() < 0.01, "{lamp}");
+    let (harmed, told, lamp) = image("drifts.npz", &[]);
+    let words = "the lamp drifts by 33.";
+    assert!(told.stderr.contains(words) && told.stderr.contains("--divide-by-sums"), "{told:?}");
+    assert!((lamp["drift"].as_f64().unwrap() - 0.333).abs() < 0.01, "{lamp}");
+    let (corrected, told, _) = image("drifts.npz", &["--divide-by-sums"]);
+    assert!(told.stderr.is_empty(), "{told:?}");
+    let (before, after) = (correlation(&harmed, &truth), correlation(&corrected, &truth));
+    assert!(after > 0.9999 && before < after - 1e-3, "{before} {after}");
+    bench
+        .run(&["reconstruct", "steady.npz", "--readings", "single", "--divide-by-sums"])
+        .failed(1, &["expected (256,) or"]);
+    let d: Vec<f32> = measured.y.chunks_exact(2).map(|pair| pair[0] - pair[1]).collect();
+    bench.write("d.npy", &encode(&[d.len()], &d));
+    let line = ["reconstruct", "d.npy", "--shown", "natural", "--readings", "differences"];
+    bench
+        .run(&[&line[..], &["--divide-by-sums"]].concat())
+        .failed(1, &["holds no complements (differences)", "with --divide-by-sums"]);
+}
+
 #[test]
 fn every_form_of_the_page_is_an_image_with_its_option() {
     let (bench, measured) = (Bench::new(), Measured::new(16));

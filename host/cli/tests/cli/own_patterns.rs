@@ -19,6 +19,83 @@ fn own_patterns(measured: &Measured, patterns: usize) -> (Vec<f32>, Vec<f32>) {
     (weights, y)
 }
 
+/// Fourier readings and those of a cyclic S-matrix by the name of their patterns.
+#[test]
+fn sets_of_patterns_have_names() {
+    let bench = Bench::new();
+    let scene: Vec<f64> = (0..48).map(|at| f64::from(at * 37 % 23) + 1.0).collect();
+    let see = |weight: &dyn Fn(usize) -> f64| (0..48).map(|at| weight(at) * scene[at]).sum::<f64>();
+    let mut steps = String::new();
+    for frequency in 0..48 {
+        let turns = |at: usize| {
+            ((frequency / 8) * (at / 8)) as f64 / 6.0 + ((frequency % 8) * (at % 8)) as f64 / 8.0
+        };
+        for step in 0..4 {
+            let moved = f64::from(step) / 4.0;
+            let weight = |at| 0.5 + 0.5 * (std::f64::consts::TAU * (turns(at) + moved)).cos();
+            steps += &format!("{}\n", 7.0 + see(&weight));
+        }
+    }
+    bench.write("steps.txt", steps.as_bytes());
+    let image = ["reconstruct", "steps.txt", "--patterns", "fourier:4", "--size", "6x8"];
+    let said = bench
+        .run(&[&image[..], &["--method", "pseudo-inverse", "--out", "f"]].concat())
+        .succeeded()
+        .stdout;
+    assert!(said.contains("48 of 48 patterns of fourier:4, rank 48"), "{said}");
+    let close = |found: &[f32], scene: &[f64], most: f64| {
+        found.iter().zip(scene).all(|(found, pixel)| (f64::from(*found) - pixel).abs() < most)
+    };
+    assert!(close(&bench.pixels("f/image.npy"), &scene, 0.01));
+    // Order 15: a shift register of 4 bits, as a table of 3 x 5 pixels.
+    let row = [1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 1, 1, 0, 1, 0];
+    let y: String = (0..15)
+        .map(|by| (0..15).map(|at| f64::from(row[(at + by) % 15]) * scene[at]).sum::<f64>())
+        .map(|reading| format!("{reading}\n"))
+        .collect();
+    bench.write("s.txt", y.as_bytes());
+    let image = ["reconstruct", "s.txt", "--matrix", "s-matrix:15", "--no-dark"];
+    let said = bench.run(&[&image[..], &["--method", "pseudo-inverse", "--out", "s"]].concat());
+    assert!(said.succeeded().stdout.contains("s.txt: 3 x 5, 15 of 15 patterns"));
+    assert!(close(&bench.pixels("s/image.npy"), &scene[..15], 0.01));
+    // `order` writes the patterns of a set, which give the same image as a file.
+    for (set, more, file) in [("s-matrix:15", &[][..], "s.txt"), ("fourier:3", &["--n", "6"], "y")]
+    {
+        let order = [&["order", set, "--out", "set"][..], more].concat();
+        bench.run(&order).succeeded();
+        if file == "y" {
+            let pixels = &scene[..36];
+            let see =
+                |row: &[f32]| row.iter().zip(pixels).map(|(w, x)| f64::from(*w) * x).sum::<f64>();
+            let y: String = bench
+                .pixels("set/patterns.npy")
+                .chunks_exact(36)
+                .map(|row| format!("{}\n", see(row)))
+                .collect();
+            bench.write(file, y.as_bytes());
+        }
+        let image = |patterns: &str, more: &[&str]| {
+            let line = ["reconstruct", file, "--matrix", patterns, "--method", "pseudo-inverse"];
+            bench.run(&[&line[..], &["--no-dark", "--out", "o"], more].concat()).succeeded();
+            bench.pixels("o/image.npy")
+        };
+        let size = if file == "y" { &["--size", "6x6"][..] } else { &[] };
+        assert!(
+            close(&image(set, size), &scene, 0.01)
+                && close(&image("set/patterns.npy", &[]), &scene, 0.01)
+        );
+    }
+    bench.run(&["order", "s-matrix:15", "--n", "8"]).failed(2, &["--n does not go with this set"]);
+    bench.run(&["order", "s-matrix:9"]).failed(2, &["s-matrix:9: expected an order up to 4095"]);
+    let refused = |set: &str, words: &str| {
+        bench.run(&["reconstruct", "s.txt", "--matrix", set]).failed(1, &[words]);
+    };
+    refused("fourier:6", "expected fourier:3, fourier:4, or s-matrix:N");
+    refused("s-matrix:16", "expected an order up to 4095");
+    refused("s-matrix:31", "expected (31,)");
+    refused("fourier:4", "expected (height, width, 4)");
+}
+
 #[test]
 fn patterns_of_the_users_own_are_inverted_by_every_method() {
     let (bench, measured) = (Bench::new(), Measured::new(16));

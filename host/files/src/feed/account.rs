@@ -18,6 +18,10 @@ pub struct Account {
     pub first_refused: Option<String>,
     /// Readings that the feed itself says were not read: NaN.
     pub not_read: u64,
+    /// Readings whose edge of the trigger was lost: they were not read.
+    pub lost: u64,
+    /// Edges of the trigger that came too early and begin no reading.
+    pub early: u64,
     /// Readings of a last frame that is not complete.
     pub cut: u64,
 }
@@ -26,8 +30,8 @@ impl Account {
     /// Whether every frame arrived with every reading.
     #[must_use]
     pub fn is_whole(&self) -> bool {
-        let Self { frames: _, empty_frames, refused, first_refused: _, not_read, cut } = self;
-        [empty_frames, refused, not_read, cut].into_iter().all(|&count| count == 0)
+        let Self { empty_frames, refused, not_read, lost, cut, .. } = self;
+        [empty_frames, refused, not_read, lost, cut].into_iter().all(|&count| count == 0)
     }
 
     /// What is missing, in one line; `None` if nothing is.
@@ -44,6 +48,9 @@ impl Account {
         if self.not_read > 0 {
             parts.push(format!("{} not read (NaN)", count(self.not_read, "reading")));
         }
+        if self.lost > 0 {
+            parts.push(format!("{} whose trigger was lost", count(self.lost, "reading")));
+        }
         if self.cut > 0 {
             parts.push(format!(
                 "{} of a last frame that is not complete",
@@ -57,9 +64,12 @@ impl Account {
 impl fmt::Display for Account {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&count(self.frames, "frame"))?;
-        match self.missing() {
-            Some(missing) => write!(f, "; {missing}"),
-            None => Ok(()),
+        if let Some(missing) = self.missing() {
+            write!(f, "; {missing}")?;
+        }
+        match self.early {
+            0 => Ok(()),
+            early => write!(f, "; {} that came too early", count(early, "edge")),
         }
     }
 }

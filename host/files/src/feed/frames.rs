@@ -2,6 +2,7 @@
 
 use super::account::Account;
 use super::header::{Header, Numbers, Samples};
+use super::trigger::{Edge, Triggered};
 use crate::error::Shown;
 use crate::measurement::is_reading;
 use crate::text;
@@ -17,6 +18,8 @@ const MAX_WORD: usize = 64;
 pub struct Frames {
     numbers: Numbers,
     samples: Samples,
+    /// Where readings begin, if a trigger says so.
+    trigger: Option<Triggered>,
     /// Readings of a frame.
     readings: usize,
     /// The frame so far.
@@ -58,6 +61,7 @@ impl Frames {
         Self {
             numbers: header.numbers,
             samples: header.samples,
+            trigger: header.trigger.map(|levels| Triggered::new(levels, header.samples.each)),
             readings: header.readings(),
             frame: Vec::with_capacity(header.readings()),
             begun: Vec::new(),
@@ -114,6 +118,13 @@ impl Frames {
         let is_text = self.numbers == Numbers::Text;
         if is_text && !self.begun.is_empty() && self.take(b"\n")?.complete {
             return Ok(true);
+        }
+        if self.is_whole_reading() {
+            self.complete_reading();
+            if self.frame.len() == self.readings && self.frame.iter().copied().any(is_reading) {
+                self.account.frames += 1;
+                return Ok(true);
+            }
         }
         let inside = self.frame.len() % self.readings;
         let begun = self.taken > 0 || !self.begun.is_empty();
@@ -193,16 +204,53 @@ impl Frames {
         if number.is_infinite() {
             return self.refuse(&number.to_string());
         }
+        let number = match &mut self.trigger {
+            None => number,
+            Some(trigger) => match trigger.take(number) {
+                None => return,
+                Some((number, Edge::None)) => number,
+                Some((number, Edge::Early)) => {
+                    self.account.early += 1;
+                    number
+                }
+                Some((number, Edge::Begins { lost })) => {
+                    if self.taken > 0 {
+                        self.complete_reading();
+                    }
+                    // The trigger of a frame may wait for the next frame for any time.
+                    let inside = self.frame.len() % self.readings;
+                    let room = if inside == 0 { 0 } else { self.readings - inside };
+                    let lost = room.min(lost);
+                    self.frame.extend(std::iter::repeat_n(f64::NAN, lost));
+                    self.account.lost += lost as u64;
+                    number
+                }
+            },
+        };
         self.taken += 1;
         if self.taken > self.samples.settle {
             self.sum += number;
         }
-        if self.taken < self.samples.each {
-            return;
+        if self.taken == self.samples.each {
+            self.complete_reading();
+            if let Some(trigger) = &mut self.trigger {
+                trigger.completed();
+            }
         }
-        let counted = f64::from(self.samples.each - self.samples.settle);
-        let mean = if self.samples.each == 1 { number } else { self.sum / counted };
+    }
+
+    /// Whether the reading that was begun has so many samples that only the edge after it is missing.
+    fn is_whole_reading(&self) -> bool {
+        self.trigger.is_some()
+            && self.taken > self.samples.settle
+            && 2 * self.taken > self.samples.each
+    }
+
+    /// Adds the mean of the samples so far to the frame.
+    fn complete_reading(&mut self) {
+        let counted = f64::from(self.taken.saturating_sub(self.samples.settle));
         // Numbers so large that their sum is infinite are no readings.
+        let mean = self.sum / counted;
         let mean = if mean.is_finite() { mean } else { f64::NAN };
         if mean.is_nan() && !self.marred {
             self.account.not_read += 1;
@@ -225,6 +273,41 @@ impl Frames {
         // A sample that does not count mars nothing.
         self.sample(f64::NAN);
     }
+}
+
+/// The mean of each reading over the frames in which it was read.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mean {
+    sums: Vec<f64>,
+    counts: Vec<u32>,
+}
+
+impl Mean {
+    /// Adds a frame of as many readings as the others.
+    pub fn add(&mut self, frame: &[f64]) {
+        self.sums.resize(frame.len(), 0.0);
+        self.counts.resize(frame.len(), 0);
+        for ((sum, count), value) in self.sums.iter_mut().zip(&mut self.counts).zip(frame) {
+            if !value.is_nan() {
+                *sum += value;
+                *count += 1;
+            }
+        }
+    }
+
+    /// The mean; NaN for a reading that was read in no frame.
+    #[must_use]
+    pub fn readings(&self) -> Vec<f64> {
+        self.sums.iter().zip(&self.counts).map(|(sum, &count)| sum / f64::from(count)).collect()
+    }
+}
+
+/// The [`Mean`] of these frames.
+#[must_use]
+pub fn mean<F: AsRef<[f64]>>(frames: &[F]) -> Vec<f64> {
+    let mut mean = Mean::default();
+    frames.iter().for_each(|frame| mean.add(frame.as_ref()));
+    mean.readings()
 }
 
 #[cfg(test)]
@@ -322,6 +405,74 @@ mod tests {
         assert_eq!((found[0][1], found[0][3]), (3.5, 7.5));
         assert!(found[0][2].is_nan());
         assert_eq!((account.refused, account.not_read, account.cut), (2, 0, 1));
+    }
+
+    #[test]
+    fn a_trigger_says_where_readings_begin_and_losses_move_no_other_reading() {
+        let header = header(",\"samples\":4,\"settle\":1,\"trigger\":[1,2]");
+        // Of each pattern its samples, the first of which has not settled, and the trigger, high for two samples.
+        let pattern = |level: f64, samples: usize| -> String {
+            (0..samples)
+                .map(|at| {
+                    format!(
+                        "{} {}\n",
+                        if at == 0 { 99.0 } else { level },
+                        if at < 2 { 5 } else { 0 }
+                    )
+                })
+                .collect()
+        };
+        let before = "7 0\n7 1.5\n";
+        let whole: String = [1.0, 2.0, 3.0, 4.0].iter().map(|&level| pattern(level, 4)).collect();
+        let (found, account) = frames(&header, [format!("{before}{whole}{whole}").as_bytes()]);
+        assert_eq!(found, [[1.0, 2.0, 3.0, 4.0], [1.0, 2.0, 3.0, 4.0]]);
+        assert!(account.is_whole(), "{account:?}");
+        // Patterns of other lengths, and a pause between frames, are no losses.
+        let pause = "0 0\n".repeat(37);
+        let uneven = [(1.0, 5), (2.0, 3), (3.0, 4), (4.0, 5)];
+        let uneven: String =
+            uneven.iter().map(|&(level, samples)| pattern(level, samples)).collect();
+        let (found, account) =
+            frames(&header, [format!("{uneven}{pause}{whole}{}", pattern(1.0, 3)).as_bytes()]);
+        assert_eq!(found, [[1.0, 2.0, 3.0, 4.0], [1.0, 2.0, 3.0, 4.0]]);
+        assert_eq!(account, Account { frames: 2, cut: 1, ..Account::default() });
+        // The edge of the second pattern is lost: its reading is not read. A frame whose last edges are lost ends in the pause.
+        let without = pattern(2.0, 4).replace(" 5\n", " 0\n");
+        let lost = [pattern(1.0, 4), without, pattern(3.0, 4), pattern(4.0, 4)].concat();
+        let cut = pattern(1.0, 4) + &pattern(2.0, 4);
+        let text = format!("0 0\n{lost}{pause}{cut}{pause}{whole}");
+        let (found, account) = frames(&header, [text.as_bytes()]);
+        let read: Vec<Vec<Option<f64>>> = found
+            .iter()
+            .map(|frame| {
+                frame.iter().map(|&value| Some(value).filter(|value| !value.is_nan())).collect()
+            })
+            .collect();
+        let (one, two) = (Some(1.0), Some(2.0));
+        assert_eq!(read[0], [one, None, Some(3.0), Some(4.0)]);
+        assert_eq!(read[1], [one, two, None, None]);
+        assert_eq!(read[2], [one, two, Some(3.0), Some(4.0)]);
+        assert_eq!((account.lost, account.frames, account.not_read), (3, 3, 0));
+        assert!(
+            account.missing().unwrap().contains("3 readings whose trigger was lost"),
+            "{account}"
+        );
+        // An edge that comes too early begins no reading, and noise between the levels is no edge.
+        let header = Header { samples: Samples { each: 8, settle: 1 }, ..header };
+        let slow: String = [1.0, 2.0, 3.0, 4.0].iter().map(|&level| pattern(level, 8)).collect();
+        let early = slow.replacen("1 5\n1 0\n1 0\n", "1 5\n1 0\n1 5\n", 1);
+        let early = early.replacen("2 5\n2 0\n", "2 1.5\n2 2.5\n", 1);
+        let (found, account) = frames(&header, [format!("0 0\n{early}").as_bytes()]);
+        assert_eq!(found, [[1.0, 2.0, 3.0, 4.0]]);
+        assert_eq!(account, Account { frames: 1, early: 1, ..Account::default() });
+        assert_eq!(account.to_string(), "1 frame; 1 edge that came too early");
+    }
+
+    #[test]
+    fn a_mean_is_over_the_frames_that_were_read() {
+        let nan = f64::NAN;
+        let found = mean(&[[1.0, nan, nan], [3.0, 5.0, nan]]);
+        assert!(found[..2] == [2.0, 5.0] && found[2].is_nan(), "{found:?}");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! (`tests::frames_are_files_that_say_what_they_hold`). The memory holds one piece, however many frames come; frames
 //! beyond what one file may hold go into the next (`tests::what_one_file_cannot_hold_goes_into_the_next`).
 
-use super::header::Header;
+use super::header::{FeedPatterns, Header};
 use crate::FileError;
 use crate::archive::{MAX_FIELD_BYTES, Members, write_members};
 use crate::measurement::{PROVENANCE, READINGS, most_together};
@@ -78,7 +78,8 @@ impl Recorder {
         let (readings, kind) = (header.readings() as u64, header.recorded());
         // What a reader takes of a field, as it is in the file and as it is in memory.
         let numbers = (MAX_FIELD_BYTES / kind.bytes() as u64).min(MAX_MEMORY_BYTES / 8);
-        let most = (numbers / readings).min(most_together(header.rows.len(), header.side)).max(1);
+        let together = most_together(header.patterns(), header.size().area());
+        let most = (numbers / readings).min(together).max(1);
         let about = About { header: header.clone(), provenance: provenance.clone() };
         Ok(Self {
             path: path.to_owned(),
@@ -180,9 +181,18 @@ impl About {
         let Self { header, provenance } = self;
         let existing = Existing::of(overwrite, None);
         write_members(&path, existing, |zip| {
-            let rows: Vec<i64> = header.rows.iter().map(|&row| row.into()).collect();
-            zip.add("n", &encode(&[], &[header.side.pixels() as i64]))?;
-            zip.add("h_row", &encode(&[rows.len()], &rows))?;
+            let one = |number: usize| encode(&[], &[number as i64]);
+            match &header.shown {
+                FeedPatterns::Hadamard { side, rows } => {
+                    let rows: Vec<i64> = rows.iter().map(|&row| row.into()).collect();
+                    zip.add("n", &one(side.pixels()))?;
+                    zip.add("h_row", &encode(&[rows.len()], &rows))?;
+                }
+                FeedPatterns::Own { size, .. } => {
+                    zip.add("height", &one(size.height()))?;
+                    zip.add("width", &one(size.width()))?;
+                }
+            }
             zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
             for (field, text) in [("unit", &header.unit), ("name", &header.name)] {
                 text.as_ref().map_or(Ok(()), |text| zip.add(field, &encode_text(text)))?;
@@ -279,7 +289,7 @@ mod tests {
         let mut recorder =
             Recorder::begin(&path, false, &header("single", ""), &provenance()).unwrap();
         // As many as fit into memory with their images; of larger frames, as many numbers as are read.
-        assert_eq!(recorder.most, most_together(2, recorder.about.header.side));
+        assert_eq!(recorder.most, most_together(2, 4));
         let large = r#"{"n":64,"order":"natural","readings":"pairs","numbers":"i16"}"#;
         let other = folder.path().join("other.npz");
         let large = Recorder::begin(&other, false, &large.parse().unwrap(), &provenance()).unwrap();

@@ -3,11 +3,12 @@
 use super::account::Account;
 use super::address::{Address, AddressError, Plain, Source, pump};
 use super::frames::{Frames, SecondHeader};
-use super::header::{Header, HeaderError};
+use super::header::{Header, HeaderError, Numbers};
+use crate::trace::Raw;
 use std::io::{self, Read};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -18,6 +19,8 @@ pub const MAX_HEADER_BYTES: usize = 16 << 20;
 const BLOCK: usize = 1 << 16;
 /// Blocks that wait while frames are made: a tenth of a second at 20 million numbers of 16 bits a second.
 pub(super) const BLOCKS: usize = 64;
+/// Time between two looks whether a feed that was full has room.
+const FULL: Duration = Duration::from_millis(1);
 /// The longest wait between two questions whether to go on.
 const TICK: Duration = Duration::from_millis(50);
 
@@ -87,6 +90,29 @@ pub struct Feed {
     end: Option<End>,
 }
 
+/// Gives the numbers of this program to a [`Feed`]. The feed ends when its last giver is dropped.
+#[derive(Debug, Clone)]
+pub struct Giver(SyncSender<io::Result<Vec<u8>>>);
+
+impl Giver {
+    /// Gives numbers in the order in which their patterns were shown, in blocks of any length. Where the feed is full, the
+    /// call waits as long as `go_on` returns true. Returns whether the feed has taken all.
+    pub fn give(&self, numbers: &[f64], go_on: impl Fn() -> bool) -> bool {
+        for some in numbers.chunks(BLOCK / size_of::<f64>()) {
+            let mut block = Ok(some.iter().flat_map(|number| number.to_le_bytes()).collect());
+            loop {
+                match self.0.try_send(block) {
+                    Ok(()) => break,
+                    Err(TrySendError::Full(full)) if go_on() => block = full,
+                    Err(_) => return false,
+                }
+                std::thread::sleep(FULL);
+            }
+        }
+        true
+    }
+}
+
 /// The bytes of a feed, read by a thread of their own. The thread ends with the feed; one that waits for a pipe or the
 /// standard input ends with the next byte, or with the program.
 #[derive(Debug)]
@@ -112,6 +138,12 @@ impl Bytes {
             pump(source, &is_closed, BLOCK, |block| give.send(block).is_ok());
         })?;
         Ok(Self { blocks, closed, last: Instant::now() })
+    }
+
+    /// Bytes that the giver gives, without a thread.
+    fn given() -> (Giver, Self) {
+        let (give, blocks) = sync_channel(BLOCKS);
+        (Giver(give), Self { blocks, closed: Arc::default(), last: Instant::now() })
     }
 
     /// The next block, if it comes in time; an empty block is the end.
@@ -145,6 +177,15 @@ impl Feed {
         go_on: impl Fn() -> bool,
     ) -> Result<Self, FeedError> {
         Self::begin(name, Box::new(Plain(reader)), go_on)
+    }
+
+    /// A feed of numbers that this program gives. What the header says of text or bytes is ignored.
+    #[must_use]
+    pub fn of_numbers(header: Header) -> (Giver, Self) {
+        let header = Header { numbers: Numbers::Binary(Raw::F64), ..header };
+        let (giver, bytes) = Bytes::given();
+        let frames = Frames::new(&header);
+        (giver, Self { header, frames, bytes, block: Vec::new(), at: 0, end: None })
     }
 
     fn begin(
@@ -291,7 +332,7 @@ mod tests {
     #[test]
     fn frames_come_until_the_end_and_the_last_needs_no_line_end() {
         let mut feed = of(format!("\u{feff}{HEADER}1 2 3 4\n5 6 7 8")).unwrap();
-        assert_eq!(feed.header().rows, [0, 1, 2, 3]);
+        assert_eq!(feed.header().hadamard().unwrap().1, [0, 1, 2, 3]);
         for expected in [[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]] {
             assert!(matches!(feed.next(PATIENCE), Next::Frame(frame) if frame == expected));
         }
@@ -311,6 +352,24 @@ mod tests {
         let Next::End(end) = feed.next(PATIENCE) else { panic!("the second header") };
         assert!(end.to_string().starts_with("a second header after 1 frame:"), "{end}");
         assert_eq!(feed.account().cut, 1);
+    }
+
+    #[test]
+    fn numbers_of_this_program_are_a_feed_that_ends_with_its_giver() {
+        let header = || HEADER.parse::<Header>().unwrap();
+        let (giver, mut feed) = Feed::of_numbers(header());
+        assert!(giver.give(&[1.0, 2.0, 3.0], || true) && giver.give(&[4.0, 5.0], || true));
+        assert!(matches!(feed.next(PATIENCE), Next::Frame([1.0, 2.0, 3.0, 4.0])));
+        assert!(matches!(feed.next(Duration::ZERO), Next::Quiet(_)));
+        drop(giver);
+        assert!(matches!(feed.next(PATIENCE), Next::End(End::Closed)));
+        assert_eq!(feed.account().cut, 1);
+        // A feed that nothing reads is full after some blocks, and a giver without a feed gives nothing.
+        let (giver, feed) = Feed::of_numbers(header());
+        assert!((0..BLOCKS).all(|_| giver.give(&[1.0], || false)));
+        assert!(!giver.give(&[1.0], || false));
+        drop(feed);
+        assert!(!giver.give(&[1.0], || true));
     }
 
     #[test]

@@ -244,7 +244,11 @@ impl Loaded<'_> {
             places,
             not_read,
             overloads,
-            claim: Claim { form: opened.form, side_guessed: opened.side_guessed },
+            claim: Claim {
+                form: opened.form,
+                side_guessed: opened.side_guessed,
+                divide_by_sums: opened.remedy.divide_by_sums,
+            },
             remedy: opened.remedy,
             patterns: count,
             reference: opened.reference(index),
@@ -276,7 +280,7 @@ pub(crate) fn is_reading(value: f64) -> bool {
 }
 
 /// The form that the file states for `y`. A field of another kind says nothing.
-fn stated_form(fields: &mut Fields) -> Option<Form> {
+pub(super) fn stated_form(fields: &mut Fields) -> Option<Form> {
     fields.text(READINGS)?.parse().ok()
 }
 

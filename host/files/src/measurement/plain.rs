@@ -3,7 +3,8 @@
 use super::axes::joined;
 use super::called::called;
 use super::layout::Layout;
-use super::opened::{is_reading, read_simulated};
+use super::named::{Coefficients, NamedPatterns, read_fourier};
+use super::opened::{is_reading, read_simulated, stated_form};
 use super::patterns::{PatternArray, PatternSelection, Patterns};
 use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings_field};
 use super::sides::{make_pairs, two_fields};
@@ -26,9 +27,11 @@ pub struct Plain {
     pub simulated: Option<bool>,
     /// What people may not expect, one line each.
     pub notes: Vec<String>,
+    /// Whether the values may hold a constant dark level.
+    pub dark: bool,
 }
 
-/// Reads patterns from `matrix`, a file or a folder of pictures, and one number for each pattern
+/// Reads patterns from `matrix`, a file, a folder of pictures, or [`NamedPatterns`], and one number for each pattern
 /// from the file `readings`: a reading, from `y` or else from `d`, or the difference of pattern and
 /// complement.
 ///
@@ -40,22 +43,31 @@ pub fn read_plain(
     readings: &Path,
     want: &Selection,
 ) -> Result<Plain, FileError> {
+    match NamedPatterns::instead_of(matrix) {
+        Some(Ok(NamedPatterns::Fourier { steps })) => {
+            let Coefficients { patterns, values, not_read, simulated, notes } =
+                read_fourier(steps, of_patterns, readings, want)?;
+            let places = (0..values.len()).collect();
+            return Ok(Plain { patterns, values, places, not_read, simulated, notes, dark: false });
+        }
+        Some(Ok(set)) => {
+            let refused = |(found, expected)| FileError::field(matrix, "--size", found, expected);
+            let patterns = set.patterns(of_patterns.size).map_err(refused)?;
+            return Ok(read_numbers(readings, want, patterns.count)?.plain(patterns));
+        }
+        Some(Err(expected)) => {
+            return Err(FileError::field(matrix, "--matrix", "is no file and no set", expected));
+        }
+        None => {}
+    }
     let array = PatternArray::open(matrix, of_patterns)?;
     let arrangements = array.arrangements(of_patterns.size)?;
     let mut refused = None;
     for arrangement in arrangements {
         match read_numbers(readings, want, arrangement.count) {
-            Ok(Numbers { all, form, simulated, mut notes }) => {
-                let (places, not_read): (Vec<usize>, Vec<usize>) =
-                    (0..all.len()).partition(|&k| is_reading(all[k]));
-                notes.extend(array.note(arrangement));
-                let patterns = array.patterns(arrangement);
-                let patterns = match form {
-                    Form::Single => patterns,
-                    _ => patterns.differences(),
-                };
-                let values = places.iter().map(|&k| all[k]).collect();
-                return Ok(Plain { patterns, values, places, not_read, simulated, notes });
+            Ok(mut numbers) => {
+                numbers.notes.extend(array.note(arrangement));
+                return Ok(numbers.plain(array.patterns(arrangement)));
             }
             Err(error) => refused = refused.or(Some(error)),
         }
@@ -71,6 +83,20 @@ struct Numbers {
     notes: Vec<String>,
 }
 
+impl Numbers {
+    fn plain(self, patterns: Patterns) -> Plain {
+        let Self { all, form, simulated, notes } = self;
+        let (places, not_read): (Vec<usize>, Vec<usize>) =
+            (0..all.len()).partition(|&k| is_reading(all[k]));
+        let patterns = match form {
+            Form::Single => patterns,
+            _ => patterns.differences(),
+        };
+        let values = places.iter().map(|&k| all[k]).collect();
+        Plain { patterns, values, places, not_read, simulated, notes, dark: true }
+    }
+}
+
 fn read_numbers(path: &Path, want: &Selection, patterns: usize) -> Result<Numbers, FileError> {
     let mut fields = Fields::open(path, want.decimal_comma)?;
     let want = &*called(&mut fields, want)?;
@@ -83,7 +109,10 @@ fn read_numbers(path: &Path, want: &Selection, patterns: usize) -> Result<Number
         Some(form) => form,
         None if is_paired => Form::Pairs,
         None if name == "d" => Form::Differences,
-        None => form_of(&mut fields, &name, want, patterns)?,
+        None => match stated_form(&mut fields).filter(|_| name == "y") {
+            Some(form) => form,
+            None => form_of(&mut fields, &name, want, patterns)?,
+        },
     };
     let mut expected = expected_of(form, patterns, vec![patterns as u64]);
     if form == Form::Single {

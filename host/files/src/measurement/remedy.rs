@@ -15,6 +15,8 @@ pub struct Remedy {
     pub shift: i32,
     /// Number of sweeps in the file, one after another; 0 is one sweep.
     pub sweeps: u32,
+    /// Each difference is divided by the sum of its pair.
+    pub divide_by_sums: bool,
 }
 
 impl Remedy {
@@ -26,14 +28,15 @@ impl Remedy {
 
     /// Refuses what the form of the readings leaves no room for.
     pub(super) fn check(self, path: &Path, field: &str, form: Form) -> Result<(), FileError> {
-        match self.complements_first && form.readings() == 1 {
-            true => {
-                let found = format!("holds no complements ({})", form.name());
-                let expected = "--readings pairs or halves with --complements-first";
-                Err(FileError::field(path, field, found, expected))
-            }
-            false => Ok(()),
-        }
+        let option = match self {
+            _ if form.readings() == 2 => return Ok(()),
+            Self { complements_first: true, .. } => "--complements-first",
+            Self { divide_by_sums: true, .. } => "--divide-by-sums",
+            _ => return Ok(()),
+        };
+        let found = format!("holds no complements ({})", form.name());
+        let expected = format!("--readings pairs or halves with {option}");
+        Err(FileError::field(path, field, found, expected))
     }
 
     /// The place among the readings of the file of the reading at `at`; `None` for a reading that is missing.

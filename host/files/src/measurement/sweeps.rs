@@ -13,8 +13,8 @@ const MOST_BYTES: u64 = 4 << 30;
 /// How many measurements of one file fit into memory together, with their images: for each pattern a row and its
 /// reading, for each pixel the image as it is computed and as it is written.
 #[must_use]
-pub fn most_together(patterns: usize, side: Side) -> u64 {
-    let each = 512 + 24 * patterns as u64 + 12 * side.area() as u64;
+pub fn most_together(patterns: usize, pixels: usize) -> u64 {
+    let each = 512 + 24 * patterns as u64 + 12 * pixels as u64;
     MOST_BYTES / each
 }
 

@@ -21,6 +21,7 @@ from . import metrics, omp, rain
 from ._nirspi import Error, devices
 from .camera import Account, Camera, Frame
 from .camera_model import CameraModel
+from .feed import Feed, FeedAccount, FeedFrame, Page, serve
 from .hadamard import Hadamard, order, orders, patterns
 from .images import Image
 from .measurement import Measurement, load, read
@@ -38,10 +39,14 @@ __all__ = [
     "Camera",
     "CameraModel",
     "Error",
+    "Feed",
+    "FeedAccount",
+    "FeedFrame",
     "Frame",
     "Hadamard",
     "Image",
     "Measurement",
+    "Page",
     "Recording",
     "bases",
     "deblur",
@@ -58,4 +63,5 @@ __all__ = [
     "rain",
     "read",
     "reconstruct",
+    "serve",
 ]

@@ -412,6 +412,7 @@ def source_options(
     inverted: bool = False,
     shift: int = 0,
     sweeps: int | None = None,
+    divide_by_sums: bool = False,
     part: str = "magnitude",
     keep_leak: bool = False,
     no_flat_field: bool = False,
@@ -430,6 +431,7 @@ def source_options(
         "inverted": bool(inverted),
         "shift": int(shift),
         "sweeps": _arrays.count(sweeps, "sweeps", least=1),
+        "divide_by_sums": bool(divide_by_sums),
         "part": part,
         "keep_leak": bool(keep_leak),
         "no_flat_field": bool(no_flat_field),
@@ -451,6 +453,7 @@ def load(
     inverted: bool = False,
     shift: int = 0,
     sweeps: int | None = None,
+    divide_by_sums: bool = False,
     part: str = "magnitude",
     keep_leak: bool = False,
     no_flat_field: bool = False,
@@ -489,6 +492,9 @@ def load(
         Number of first readings of the sweep that the file lacks; -K: K readings came before the sweep.
     sweeps : int, optional
         Number of sweeps of the same patterns in the file, one after another.
+    divide_by_sums : bool
+        Whether each difference is divided by the sum of its pair, against a lamp that drifts or flickers.
+        Ambient light makes this correction too weak.
     part : {"magnitude", "real", "imaginary"}
         Of complex readings: "magnitude" keeps both parts (``d`` is complex).
     keep_leak : bool
@@ -529,6 +535,7 @@ def load(
         inverted=inverted,
         shift=shift,
         sweeps=sweeps,
+        divide_by_sums=divide_by_sums,
         part=part,
         keep_leak=keep_leak,
         no_flat_field=no_flat_field,

@@ -7,8 +7,8 @@
 use super::dropout::{dark_level, local_level};
 use super::robust::{correlation_of_changes, deviation, median, running_median, step};
 use super::{
-    Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, Outlier, Reading, dropout, few,
-    repeats,
+    Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, Lamp, Outlier, Reading, dropout,
+    few, repeats,
 };
 use crate::measurements::{MeasurementError, expect_finite};
 use crate::{Measurements, Rows, order};
@@ -72,7 +72,14 @@ pub(super) fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Meas
         if !doubt.is_of_sign() {
             let measurements = differences(rows, pairs, |_| true)?;
             let (dropouts, outliers) = (Vec::new(), Vec::new());
-            return Ok(Reading { measurements, dropouts, outliers, doubts, dark_level: None });
+            return Ok(Reading {
+                measurements,
+                dropouts,
+                outliers,
+                doubts,
+                dark_level: None,
+                lamp: None,
+            });
         }
     }
     let upright: Vec<[f64; 2]> = match other {
@@ -126,7 +133,13 @@ pub(super) fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Meas
         lost[k] = true;
     }
     outliers.sort_by_key(|outlier| outlier.reading);
-    let mut measurements = differences(rows, pairs, |k| !lost[k])?;
+    let kept: Vec<usize> = (0..pairs.len()).filter(|&k| !lost[k]).collect();
+    let lamp = Lamp::of(&upright, &level, &kept, first).filter(|_| clipped.is_none());
+    let steady = match claim.divide_by_sums {
+        true => divided(pairs, &kept),
+        false => pairs.to_vec(),
+    };
+    let mut measurements = differences(rows, &steady, |k| !lost[k])?;
     if let (Some(difference), Some(at)) =
         (all_on, measurements.rows().iter().position(|&row| row == 0))
     {
@@ -134,7 +147,23 @@ pub(super) fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Meas
     }
     let most_noise = most_noise(rows, pairs, |k| !lost[k]);
     let measurements = measurements.with_most_noise(most_noise);
-    Ok(Reading { measurements, dropouts, outliers, doubts, dark_level: None })
+    Ok(Reading { measurements, dropouts, outliers, doubts, dark_level: None, lamp })
+}
+
+/// The pairs as under a lamp that gives each of them the median sum of those that are kept. A pair with less than a tenth of
+/// this sum has too little light to say how much.
+fn divided(pairs: &[[f64; 2]], kept: &[usize]) -> Vec<[f64; 2]> {
+    let sums = sums(pairs);
+    if kept.is_empty() {
+        return pairs.to_vec();
+    }
+    let usual = median(kept.iter().map(|&k| sums[k]).collect());
+    let share = |sum: f64| (sum / usual).max(0.1);
+    let one = |(pair, &sum): (&[f64; 2], &f64)| match usual == 0.0 {
+        true => *pair,
+        false => pair.map(|reading| reading / share(sum)),
+    };
+    pairs.iter().zip(&sums).map(one).collect()
 }
 
 /// Fewest pairs whose sums say something of the noise.

@@ -101,7 +101,7 @@ pub(super) fn read_single(
             }
         }
     }
-    Ok(Reading { measurements, dropouts: Vec::new(), outliers, doubts, dark_level })
+    Ok(Reading { measurements, dropouts: Vec::new(), outliers, doubts, dark_level, lamp: None })
 }
 
 pub(super) fn read_differences(
@@ -153,7 +153,14 @@ pub(super) fn read_differences(
     }
     let (rows, d) = without(rows, d, &outliers);
     let measurements = Measurements::from_differential(&rows, &d)?;
-    Ok(Reading { measurements, dropouts: Vec::new(), outliers, doubts, dark_level: None })
+    Ok(Reading {
+        measurements,
+        dropouts: Vec::new(),
+        outliers,
+        doubts,
+        dark_level: None,
+        lamp: None,
+    })
 }
 
 /// The position of a difference that stands out from all others, if there is one.

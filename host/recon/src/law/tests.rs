@@ -27,7 +27,7 @@ fn shown(order: &Order, n: u64) -> Rows {
 }
 
 fn claim(form: Form) -> Claim {
-    Claim { form, side_guessed: true }
+    Claim { side_guessed: true, ..form.into() }
 }
 
 /// The readings in each form that they can have.
@@ -80,7 +80,7 @@ mod right {
             let unit = match noise { Noise::Poisson { photons, .. } => photons, Noise::Normal { .. } => 1.0 };
             let y = recorded(&rows, kind, drift, dark * unit, noise);
             for (form, y) in in_every_form(&y) {
-                let claim = Claim { form, side_guessed: share == 1.0 };
+                let claim = Claim { side_guessed: share == 1.0, ..form.into() };
                 let said = is_silent(&rows, &y, claim);
                 prop_assert!(said.is_ok(), "{form:?}: {said:?}");
             }
@@ -160,6 +160,53 @@ mod right {
             assert!(said.is_ok(), "wing, {form:?}: {said:?}");
         }
     }
+}
+
+/// Differences of a scene under a lamp that changes, by their sums or as they are, and how far they are from those of a
+/// steady lamp: root of the mean square, without the all-on pattern.
+fn under_a_lamp(lamp: fn(f64) -> f64, ambient: f64, sigma: f64) -> (Lamp, f64, f64) {
+    let rows = shown(&Order::ZigZag, 32);
+    let steady = recorded(&rows, 1, 0.0, 0.0, Noise::Normal { sigma: 0.0, seed: 1 });
+    let noisy = recorded(&rows, 1, 0.0, 0.0, Noise::Normal { sigma, seed: 1 });
+    let y: Vec<f64> = (0..noisy.len())
+        .map(|k| steady[k] * lamp((k / 2) as f64) + ambient + noisy[k] - steady[k])
+        .collect();
+    let of = |divide_by_sums| {
+        let read = read(&rows, &y, Claim { divide_by_sums, ..Form::Pairs.into() }).unwrap();
+        // The unit of divided differences is the lamp's median.
+        let truth = Measurements::from_pairs(&rows, &steady).unwrap().measurements;
+        let (found, truth) = (&read.measurements.values()[1..], &truth.values()[1..]);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let scale = dot(found, truth) / dot(truth, truth);
+        let off: f64 = found.iter().zip(truth).map(|(f, t)| (f - scale * t).powi(2)).sum();
+        (read.lamp.unwrap(), (off / truth.len() as f64).sqrt())
+    };
+    let ((lamp, as_it_is), (same, divided)) = (of(false), of(true));
+    assert_eq!(lamp, same, "of the readings as they came");
+    (lamp, as_it_is, divided)
+}
+
+#[test]
+fn a_lamp_that_drifts_is_told_where_it_limits_and_sums_correct_it() {
+    let steady = |_| 1.0;
+    let (lamp, as_it_is, divided) = under_a_lamp(steady, 0.0, 1e-3);
+    assert!(!lamp.limits && lamp.drift < 0.01 && lamp.spread > 0.0, "{lamp:?}");
+    assert!(divided < 1.1 * as_it_is, "{divided} {as_it_is}");
+    let drifts = |k: f64| 1.0 + 0.3 * k / 1023.0;
+    let (lamp, as_it_is, divided) = under_a_lamp(drifts, 0.0, 1e-4);
+    assert!(lamp.limits && (lamp.drift - 0.3 / 1.15).abs() < 0.02, "{lamp:?}");
+    assert!(divided < 0.2 * as_it_is, "{divided} {as_it_is}");
+    // Flicker from pair to pair is no drift, and the sums correct it, too.
+    let flickers = |k: f64| 1.0 + 0.05 * (k * 2.1).sin();
+    let (lamp, as_it_is, divided) = under_a_lamp(flickers, 0.0, 1e-4);
+    assert!(!lamp.limits && (lamp.spread - 0.05 / 2_f64.sqrt()).abs() < 0.01, "{lamp:?}");
+    assert!(divided < 0.2 * as_it_is, "{divided} {as_it_is}");
+    // Ambient light is in each sum, and leaves a part of the drift.
+    let (_, as_it_is, divided) = under_a_lamp(drifts, 3.0, 1e-4);
+    assert!(divided > 0.2 * as_it_is, "{divided} {as_it_is}");
+    // Noise hides the drift.
+    let (lamp, _, _) = under_a_lamp(drifts, 0.0, 0.02);
+    assert!(!lamp.limits, "{lamp:?}");
 }
 
 /// Real photon counts, pattern and complement, natural order, 32 x 32.

@@ -2,8 +2,8 @@
 
 use super::{Seconds, StopCause};
 use nirspi_files::FileError;
-use nirspi_files::feed::{Account, Address, End, Feed, Next, Recorder};
-use nirspi_recon::words::count;
+use nirspi_files::feed::{Account, Address, End, Feed, Mean, Next, Recorder};
+use nirspi_recon::words::{count, count_of};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -29,8 +29,13 @@ pub struct FeedReport {
     /// The name that the bench has in the header.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Side of the image.
-    pub n: usize,
+    /// Side of the image of Hadamard patterns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub n: Option<usize>,
+    /// Height of the image in pixels.
+    pub height: usize,
+    /// Width of the image in pixels.
+    pub width: usize,
     /// The order of the patterns.
     pub order: String,
     /// Number of patterns of a frame.
@@ -53,22 +58,33 @@ pub struct FeedReport {
     pub seconds: f64,
     /// Readings a second.
     pub readings_per_s: f64,
+    /// The mean of all frames.
+    #[serde(skip)]
+    pub mean: Mean,
 }
 
 impl FeedReport {
     /// The report in words, a line each.
     #[must_use]
     pub fn words(&self, address: &Address) -> Vec<String> {
-        let Self { n, order, readings, account, ended, seconds, readings_per_s, .. } = self;
+        let Self { n, height, width, order, readings, account, ended, .. } = self;
+        let Self { seconds, readings_per_s, .. } = self;
         let name = self.name.clone().unwrap_or_else(|| address.to_string());
+        let patterns = match n {
+            Some(_) => format!("order {order}"),
+            None => count_of(self.patterns, "pattern") + " of its own",
+        };
         let mut words = vec![
-            format!("{name}: {n} x {n}, order {order}, readings {readings}"),
+            format!("{name}: {height} x {width}, {patterns}, readings {readings}"),
             format!("{account}; {ended}"),
             format!("{readings_per_s:.0} readings/s over {seconds:.2} s"),
         ];
         let files: Vec<String> = self.files.iter().map(|file| file.display().to_string()).collect();
         let open = match &files[..] {
             [] => return words,
+            [file, ..] if n.is_none() => {
+                format!("{file} --index 0 --matrix PATTERNS --size {height}x{width}")
+            }
             [file] => format!("{file} --index all"),
             files => files.join(" "),
         };
@@ -92,10 +108,12 @@ pub fn record_feed(
     let began = Instant::now();
     let mut told = began;
     let mut recorded = 0;
+    let mut mean = Mean::default();
     let (ended, is_bad) = loop {
         let quiet = match feed.next(TICK) {
             Next::Frame(readings) => {
                 recorder.push(readings)?;
+                mean.add(readings);
                 recorded += 1;
                 None
             }
@@ -141,9 +159,11 @@ pub fn record_feed(
     }
     Ok(FeedReport {
         name: header.name.clone(),
-        n: header.side.pixels(),
+        n: header.hadamard().ok().map(|(side, _)| side.pixels()),
+        height: header.size().height(),
+        width: header.size().width(),
         order: header.order(),
-        patterns: header.rows.len(),
+        patterns: header.patterns(),
         readings: header.form.name(),
         files: recorded.files,
         asked: frames,
@@ -153,6 +173,7 @@ pub fn record_feed(
         seconds,
         readings_per_s: (recorded.frames * header.readings() as u64) as f64 / seconds,
         account,
+        mean,
     })
 }
 
@@ -181,6 +202,7 @@ mod tests {
         let report = record(&format!("{HEADER}1 2 3 4 5 6 7 8\n"), None);
         assert_eq!((report.account.frames, report.complete, report.missing), (2, true, None));
         assert_eq!((&*report.order, report.files.len()), ("natural", 1));
+        assert_eq!(report.mean.readings(), [3.0, 4.0, 5.0, 6.0]);
         let report = record(&format!("{HEADER}1 2 3 4 5 6 7 8\n"), Some(1));
         assert_eq!((report.account.frames, report.complete), (1, true));
         let report = record(&format!("{HEADER}1 2 3 4\n"), Some(3));

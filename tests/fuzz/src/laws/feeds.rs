@@ -19,8 +19,10 @@ fn feeds(bytes: &[u8]) {
     let end = bytes.iter().position(|&byte| byte == b'\n').unwrap_or(bytes.len());
     let Ok(line) = std::str::from_utf8(&bytes[..end]) else { return };
     let Some(header) = read(line.parse::<Header>()) else { return };
-    assert!(!header.rows.is_empty() && header.samples.settle < header.samples.each);
-    assert!(header.rows.iter().all(|&row| (row as usize) < header.side.area()));
+    assert!(header.patterns() > 0 && header.samples.settle < header.samples.each);
+    if let Ok((side, rows)) = header.hadamard() {
+        assert!(rows.iter().all(|&row| (row as usize) < side.area()));
+    }
     let numbers = bytes.get(end + 1..).unwrap_or_default();
     let whole = frames(&header, [numbers]);
     let cut = frames(&header, numbers.chunks(3));
@@ -69,6 +71,10 @@ fn seeds() -> Vec<Vec<u8>> {
         feed(
             r#"{"n":4,"h_row":[0,3,3],"readings":"single","numbers":"i16","samples":2,"settle":1}"#,
             &[7; 31],
+        ),
+        feed(
+            r#"{"height":2,"width":3,"patterns":2,"readings":"single","samples":3,"trigger":[1,2]}"#,
+            b"7 0 1 5 2 5 3 0 4 0 1 5 x 3 2 0 9 9 nan 0 0 5\n5 0 5 5 5",
         ),
         feed(
             r#"{"n":2,"order":"natural","patterns":2,"readings":"halves","numbers":"f32"}"#,

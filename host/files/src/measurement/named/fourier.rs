@@ -1,0 +1,311 @@
+//! Fourier patterns: readings under cosines of each frequency in three or four steps, or the spectrum that was made of
+//! them.
+//!
+//! The pattern of frequency (v, u) in step p of s is `1/2 + cos(2 pi (v r / height + u c / width + p / s)) / 2` on pixel
+//! (r, c). The readings of one frequency give its complex coefficient, without any constant light (Z. Zhang, X. Ma and
+//! J. Zhong, Nat. Commun. 6, 6225 (2015)). A coefficient and that of the opposite frequency are conjugate; each pair gives
+//! two real rows, a cosine and a sine, so that all rows are orthogonal.
+
+use crate::FileError;
+use crate::field::Field;
+use crate::fields::Fields;
+use crate::measurement::called::called;
+use crate::measurement::opened::{is_reading, read_simulated};
+use crate::measurement::patterns::Patterns;
+use crate::measurement::readings::readings_field;
+use crate::measurement::{PatternSelection, Selection};
+use crate::plain::MAX_MEMORY_BYTES;
+use nirspi_recon::Size;
+use nirspi_recon::words::count_of;
+use std::f64::consts::{SQRT_2, TAU};
+use std::path::Path;
+
+/// A complex number.
+type Complex = (f64, f64);
+
+/// The angle of a frequency at a pixel, in turns.
+fn turns(size: Size, (v, u): (usize, usize), pixel: usize) -> f64 {
+    let (height, width) = (size.height(), size.width());
+    let (row, column) = (pixel / width, pixel % width);
+    // The whole turns are left out before the division, which is then exact enough at any frequency.
+    let down = (v * row % height) as f64 / height as f64;
+    down + (u * column % width) as f64 / width as f64
+}
+
+/// The patterns as they are shown: of each frequency, row by row, all steps.
+pub(super) fn shown(size: Size, steps: usize) -> Result<Patterns, (String, String)> {
+    let (area, count) = (size.area(), size.area() * steps);
+    if (count * area * size_of::<f64>()) as u64 > MAX_MEMORY_BYTES {
+        return Err((format!("{count} patterns of {size} pixels"), "at most 1 GiB".to_owned()));
+    }
+    let mut weights = Vec::with_capacity(count * area);
+    for frequency in 0..area {
+        let frequency = (frequency / size.width(), frequency % size.width());
+        for step in 0..steps {
+            let moved = step as f64 / steps as f64;
+            let weight = |pixel| 0.5 + 0.5 * (TAU * (turns(size, frequency, pixel) + moved)).cos();
+            weights.extend((0..area).map(weight));
+        }
+    }
+    Ok(Patterns { size, count, weights })
+}
+
+/// Coefficients of frequencies side by side: rows `v`, columns `u` from 0 on, as many as were measured.
+struct Spectrum {
+    size: Size,
+    columns: usize,
+    /// `None`: not read.
+    values: Vec<Option<Complex>>,
+}
+
+/// Coefficients of frequencies as readings of cosines and sines, without a dark level.
+pub(in crate::measurement) struct Coefficients {
+    /// The cosines and sines.
+    pub(in crate::measurement) patterns: Patterns,
+    /// A value for each.
+    pub(in crate::measurement) values: Vec<f64>,
+    /// Frequencies that were not read.
+    pub(in crate::measurement) not_read: Vec<usize>,
+    /// Whether the file says that no real light was measured; `None` if it does not say.
+    pub(in crate::measurement) simulated: Option<bool>,
+    /// What people may not expect, one line each.
+    pub(in crate::measurement) notes: Vec<String>,
+}
+
+/// Reads the readings of Fourier patterns, or a complex spectrum, from a file.
+///
+/// # Errors
+/// As [`read`](crate::measurement::read).
+pub(in crate::measurement) fn read_fourier(
+    steps: usize,
+    of_patterns: &PatternSelection,
+    readings: &Path,
+    want: &Selection,
+) -> Result<Coefficients, FileError> {
+    let mut fields = Fields::open(readings, want.decimal_comma)?;
+    let want = &*called(&mut fields, want)?;
+    let name = readings_field(&fields, want)?;
+    let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
+    let simulated = read_simulated(&mut fields);
+    let refused =
+        |found: String, expected: String| FileError::field(readings, name.clone(), found, expected);
+    let field = match fields.is_unnamed() {
+        true => fields.into_field(&name)?,
+        false => fields.read(&name, |_| Ok(()))?,
+    };
+    let field = one_of(field, want.index).map_err(|(found, expected)| refused(found, expected))?;
+    let is_spectrum = field.imaginary.is_some();
+    let mut spectrum = match is_spectrum {
+        true => of_complex(field, of_patterns.size),
+        false => of_steps(&field, steps, of_patterns.size),
+    }
+    .map_err(|(found, expected)| refused(found, expected))?;
+    notes.extend(spectrum.center());
+    let not_read: Vec<usize> =
+        (0..spectrum.values.len()).filter(|&at| spectrum.values[at].is_none()).collect();
+    let (size, area) = (spectrum.size, spectrum.size.area());
+    let (rows, values) = spectrum.rows();
+    if values.is_empty() {
+        return Err(refused(
+            "has no frequency that was read".to_owned(),
+            "at least one".to_owned(),
+        ));
+    }
+    if (rows.len() * area * size_of::<f64>()) as u64 > MAX_MEMORY_BYTES {
+        let found = format!("has {} of {size} pixels", count_of(rows.len(), "coefficient"));
+        return Err(refused(found, "at most 1 GiB of patterns: about 100 x 100 pixels".to_owned()));
+    }
+    let weights = rows.iter().flat_map(|row| row.weights(size)).collect();
+    let patterns = Patterns { size, count: rows.len(), weights };
+    notes.push(match is_spectrum {
+        true => format!("a spectrum of {} frequencies", area - not_read.len()),
+        false => format!("{steps} steps of each frequency: constant light falls out"),
+    });
+    Ok(Coefficients { patterns, values, not_read, simulated, notes })
+}
+
+/// The measurement of this index, along the first axis.
+fn one_of(mut field: Field, index: Option<usize>) -> Result<Field, (String, String)> {
+    let Some(index) = index else { return Ok(field) };
+    let several = field.shape.first().copied().unwrap_or(1);
+    if field.shape.len() < 2 || index >= several {
+        let found = format!("has shape {:?} for --index {index}", field.shape);
+        return Err((found, "several measurements along the first axis".to_owned()));
+    }
+    let each = field.real.len() / several;
+    let part = index * each..(index + 1) * each;
+    field.real = field.real[part.clone()].to_vec();
+    field.imaginary = field.imaginary.map(|imaginary| imaginary[part].to_vec());
+    field.shape.remove(0);
+    Ok(field)
+}
+
+/// The size of the image and the columns of the spectrum for this many frequencies.
+fn layout(
+    frequencies: usize,
+    shape: Option<(usize, usize)>,
+    size: Option<Size>,
+) -> Option<(Size, usize)> {
+    let half = |size: Size| size.width() / 2 + 1;
+    let fits = |size: Size, columns: usize| {
+        size.height() * columns == frequencies
+            && shape.is_none_or(|shape| shape == (size.height(), columns))
+    };
+    let of = |size: Size| {
+        [size.width(), half(size)]
+            .into_iter()
+            .find(|&columns| fits(size, columns))
+            .map(|c| (size, c))
+    };
+    if let Some(size) = size {
+        return of(size);
+    }
+    if let Some((height, width)) = shape {
+        let square = Size::new(height, height).ok().and_then(of);
+        return square.or_else(|| Size::new(height, width).ok().and_then(of));
+    }
+    (1..=frequencies.isqrt() * 2).filter_map(|side| Size::new(side, side).ok()).find_map(of)
+}
+
+fn refusal(shape: &[usize], steps: Option<usize>) -> (String, String) {
+    let axes: Vec<String> = shape.iter().map(ToString::to_string).collect();
+    let found = format!("has shape ({})", axes.join(", "));
+    let each = steps.map_or(String::new(), |steps| format!(", {steps}"));
+    let expected = format!(
+        "(height, width{each}) or (height, width / 2 + 1{each}) frequencies, or --size HxW beside one axis"
+    );
+    (found, expected)
+}
+
+/// The spectrum that a file holds.
+fn of_complex(field: Field, size: Option<Size>) -> Result<Spectrum, (String, String)> {
+    let shape: Vec<usize> = field.shape.iter().copied().filter(|&axis| axis != 1).collect();
+    let two = match shape[..] {
+        [height, width] => Some((height, width)),
+        _ => None,
+    };
+    let (size, columns) =
+        layout(field.real.len(), two, size).ok_or_else(|| refusal(&field.shape, None))?;
+    let imaginary = field.imaginary.unwrap_or_default();
+    let value = |(&real, &imaginary): (&f64, &f64)| {
+        (is_reading(real) && is_reading(imaginary)).then_some((real, imaginary))
+    };
+    let values = field.real.iter().zip(&imaginary).map(value).collect();
+    Ok(Spectrum { size, columns, values })
+}
+
+/// The coefficients of readings in steps: a last axis of the steps, a first axis, or one after another.
+fn of_steps(field: &Field, steps: usize, size: Option<Size>) -> Result<Spectrum, (String, String)> {
+    let shape: Vec<usize> = field.shape.iter().copied().filter(|&axis| axis != 1).collect();
+    let refused = || refusal(&field.shape, Some(steps));
+    let (is_first, rest) = match shape[..] {
+        [ref rest @ .., last] if last == steps && !rest.is_empty() => (false, rest),
+        [first, ref rest @ ..] if first == steps && !rest.is_empty() => (true, rest),
+        [all] if all % steps == 0 => (false, &[][..]),
+        _ => return Err(refused()),
+    };
+    let frequencies = field.real.len() / steps;
+    let two = match *rest {
+        [height, width] => Some((height, width)),
+        _ => None,
+    };
+    let (size, columns) = layout(frequencies, two, size).ok_or_else(refused)?;
+    let at = |frequency: usize, step: usize| match is_first {
+        true => field.real[step * frequencies + frequency],
+        false => field.real[frequency * steps + step],
+    };
+    let value = |frequency: usize| -> Option<Complex> {
+        let read = |step| Some(at(frequency, step)).filter(|&value| is_reading(value));
+        match steps {
+            4 => Some((read(0)? - read(2)?, read(1)? - read(3)?)),
+            _ => {
+                let (one, two, three) = (read(0)?, read(1)?, read(2)?);
+                let real = (2.0 * one - two - three) * 2.0 / 3.0;
+                Some((real, (two - three) * 2.0 / 3.0_f64.sqrt()))
+            }
+        }
+    };
+    Ok(Spectrum { size, columns, values: (0..frequencies).map(value).collect() })
+}
+
+/// A row of the matrix: a cosine, or a sine downwards, of a frequency.
+struct Row {
+    frequency: (usize, usize),
+    is_sine: bool,
+    scale: f64,
+}
+
+impl Row {
+    fn weights(&self, size: Size) -> impl Iterator<Item = f64> + '_ {
+        (0..size.area()).map(move |pixel| {
+            let angle = TAU * turns(size, self.frequency, pixel);
+            self.scale * if self.is_sine { -angle.sin() } else { angle.cos() }
+        })
+    }
+}
+
+impl Spectrum {
+    /// Moves the zero frequency from the middle to the beginning, if it stands there: light has no frequency of larger
+    /// amplitude. Returns a note.
+    fn center(&mut self) -> Option<String> {
+        let (height, columns) = (self.size.height(), self.columns);
+        let is_whole = columns == self.size.width();
+        let middle = (height / 2, if is_whole { columns / 2 } else { 0 });
+        let amplitude =
+            |at: usize| self.values[at].map_or(0.0, |(real, imaginary)| real.hypot(imaginary));
+        let at = (0..self.values.len()).max_by(|&a, &b| amplitude(a).total_cmp(&amplitude(b)))?;
+        let (v, u) = (at / columns, at % columns);
+        if (v, u) == (0, 0) {
+            return None;
+        }
+        if (v, u) != middle {
+            return Some(format!(
+                "frequency [{v}, {u}] is larger than the zero frequency: light has no such spectrum"
+            ));
+        }
+        let values = &self.values;
+        let from = |at: usize| {
+            ((at / columns + middle.0) % height) * columns + (at % columns + middle.1) % columns
+        };
+        self.values = (0..values.len()).map(|at| values[from(at)]).collect();
+        Some("the zero frequency is in the middle of the spectrum".to_owned())
+    }
+
+    /// The rows of all coefficients that were read, and their values, all with the same noise.
+    fn rows(&self) -> (Vec<Row>, Vec<f64>) {
+        let (height, width) = (self.size.height(), self.size.width());
+        let read = |v: usize, u: usize| match u < self.columns {
+            true => self.values[v * self.columns + u],
+            false => None,
+        };
+        let (mut rows, mut values) = (Vec::new(), Vec::new());
+        for v in 0..height {
+            for u in 0..width {
+                let frequency = (v, u);
+                let opposite = ((height - v) % height, (width - u) % width);
+                if frequency > opposite {
+                    continue;
+                }
+                let one = read(v, u);
+                let is_own = frequency == opposite;
+                let other = if is_own { None } else { read(opposite.0, opposite.1) };
+                let (value, scale) = match (one, other.map(|(real, imaginary)| (real, -imaginary)))
+                {
+                    // The mean has less noise, so that it counts for more.
+                    (Some(one), Some(other)) => {
+                        (((one.0 + other.0) / 2.0, (one.1 + other.1) / 2.0), SQRT_2)
+                    }
+                    (Some(value), None) | (None, Some(value)) => (value, 1.0),
+                    (None, None) => continue,
+                };
+                rows.push(Row { frequency, is_sine: false, scale });
+                values.push(scale * value.0);
+                if !is_own {
+                    rows.push(Row { frequency, is_sine: true, scale });
+                    values.push(scale * value.1);
+                }
+            }
+        }
+        (rows, values)
+    }
+}
