@@ -2,7 +2,7 @@
 
 use super::calibration::CalibrationArgs;
 use super::camera::{self, CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
-use super::report::ReportArgs;
+use super::report::{FigureArgs, ReportArgs};
 use super::{Usage, address, feed, print, progress, provenance};
 use anyhow::Result;
 use nirspi::capture::{
@@ -80,6 +80,8 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     picture: Option<PathBuf>,
     #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -140,8 +142,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let report = CaptureReport::new(session.identity(), &choice, &captured)?;
     let code = say(args, &report)?;
     if let Some(out) = args.picture.as_ref().filter(|_| captured.counters.received > 0) {
-        let warnings =
-            super::reconstruct::picture(&captured, choice.flat_field.clone(), path, out)?;
+        let warnings = super::reconstruct::picture(
+            &captured,
+            choice.flat_field.clone(),
+            path,
+            out,
+            args.figure,
+        )?;
         for warning in warnings {
             print::warning(warning);
         }

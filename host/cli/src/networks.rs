@@ -1,11 +1,12 @@
 //! The common parts of commands that run networks: weights, device, progress, report.
 
-use super::report::{Overwrite, ReportArgs, StageTimes};
+use super::report::{FigureArgs, Overwrite, ReportArgs, StageTimes};
 use super::{Usage, print};
 use anyhow::{Context, Result};
 use nirspi::imaging::stack::{ImageStack, StackTarget};
 use nirspi::imaging::{Deblurring, StackReport};
 use nirspi::picture::Pictures;
+use nirspi::provenance::Provenance;
 use nirspi_nets::{Arithmetic, Backend, Device, Images, Networks, WeightsError};
 use nirspi_recon::words::count_of;
 use std::path::{Path, PathBuf};
@@ -43,6 +44,8 @@ pub struct ImageArgs {
     #[command(flatten)]
     pub networks: NetworkArgs,
     #[command(flatten)]
+    pub figure: FigureArgs,
+    #[command(flatten)]
     pub report: ReportArgs,
 }
 
@@ -58,6 +61,17 @@ impl ImageArgs {
             if self.report.json { print::remark(note) } else { print::note(note)? }
         }
         Ok(images)
+    }
+
+    /// Writes the results with this title, and a picture beside them.
+    pub fn write(
+        &self,
+        target: &StackTarget,
+        (side, images): (usize, &[f32]),
+        title: &str,
+        provenance: &Provenance,
+    ) -> Result<Pictures> {
+        Ok(target.write_and_show(side, images, title, self.figure.figure, provenance)?)
     }
 
     /// Where the results of these images go, or further results of theirs.

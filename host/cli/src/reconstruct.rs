@@ -8,7 +8,7 @@ use super::camera::parse_order;
 use super::method::MethodArgs;
 use super::progress::Progress;
 use super::provenance::made;
-use super::report::{ReportArgs, StageTimes, stages};
+use super::report::{FigureArgs, ReportArgs, StageTimes, stages};
 use super::source::SourceArgs;
 use super::{Usage, print};
 use anyhow::Result;
@@ -80,6 +80,8 @@ pub struct Args {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -108,7 +110,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let solver = args.method.solver(first, args.sampling)?;
     let (input, enhance, out) = (&*args.source.input, args.enhance, &*args.out);
     let made = made();
-    let request = OneImage { input, solver: &solver, enhance, out, made };
+    let figure = args.figure.figure;
+    let request = OneImage { input, solver: &solver, enhance, out, made, figure };
     let report = one_image(&request, source, times)?;
     args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
 }
@@ -120,10 +123,12 @@ pub fn picture(
     flat_field: Option<KeptFlatField>,
     recording: &Path,
     out: &Path,
+    figure: FigureArgs,
 ) -> Result<Vec<String>> {
     let solver = MethodArgs::default().solver(FirstPatterns::LowestSequencies, Sampling::ALL)?;
     let made = made();
-    let request = OneImage { input: recording, solver: &solver, enhance: true, out, made };
+    let figure = figure.figure;
+    let request = OneImage { input: recording, solver: &solver, enhance: true, out, made, figure };
     let mut source = Source::of_capture(captured)?;
     if let Some(kept) = flat_field {
         source = source.with_flat_field(kept);

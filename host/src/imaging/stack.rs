@@ -11,7 +11,7 @@ use crate::files::image::{
 };
 use crate::files::npy;
 use crate::files::output::{Existing, OutputDir, write_result};
-use crate::picture::{Panel, Pictures, Sheet, SideBySide, Unit};
+use crate::picture::{FigureStyle, Panel, Pictures, Sheet, SideBySide, Unit};
 use crate::provenance::{Provenance, Taken};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -303,6 +303,7 @@ impl StackTarget {
         side: usize,
         values: &[f32],
         title: &str,
+        figure: FigureStyle,
         provenance: &Provenance,
     ) -> Result<Pictures> {
         let name = match self.kind {
@@ -311,16 +312,18 @@ impl StackTarget {
         };
         let name = name.map_or_else(|| "images".into(), |name| name.to_string_lossy());
         let file = self.path.with_file_name(format!("{name}{FOR_PEOPLE}"));
-        let mut pictures = Pictures::new(provenance);
+        let mut pictures = Pictures::new(figure, provenance);
         let named = file.display().to_string();
-        self.existing().check(&file)?;
+        for ending in ["png", "svg", "pdf"] {
+            self.existing().check(&file.with_extension(ending))?;
+        }
         self.write(side, values, provenance)?;
         match &self.input {
             Shown::Single(input) => {
                 let result = Panel::square(title, side, values, Unit::OfWhite);
                 let panels = vec![input.clone(), result];
                 let (header, footer) = (String::new(), String::new());
-                pictures.add(&named, &SideBySide { header, panels, footer });
+                pictures.add(&named, SideBySide { header, panels, footer });
             }
             Shown::Many => {
                 let images = values.chunks_exact(side * side).collect();
