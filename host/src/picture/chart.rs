@@ -205,7 +205,7 @@ impl Chart {
         let thin = f64::from(look.px(1));
 
         laid.header.draw(&mut canvas, margin, margin);
-        laid.y_name.draw(&mut canvas, margin, top as u32 - laid.y_name.height() - look.px(6));
+        laid.y_name.draw(&mut canvas, margin, top as u32 - laid.y_name.height() - look.px(10));
         for &tick in &self.x.ticks {
             let ends = [(x_px(tick), top), (x_px(tick), bottom)];
             canvas.line(ends, thin, look.palette.grid);
@@ -255,7 +255,7 @@ impl Chart {
         let header = Block::new(Style::title(look), [self.header.as_str()], inner);
         let y_name = Block::new(plain, [self.y.name.as_str()], inner);
         let x_name = Block::new(plain, [self.x.name.as_str()], right - left);
-        let top = margin + header.height_and(look.px(6)) + y_name.height() + look.px(6);
+        let top = margin + header.height_and(look.px(6)) + y_name.height() + look.px(10);
         // Wide charts are flatter.
         let high = look.px(160) + (right - left) * 28 / 100;
         let bottom = top + high;

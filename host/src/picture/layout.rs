@@ -237,10 +237,14 @@ impl SideBySide {
         let axis_px = if axis > 0 { look.px(4) + plain.line_px } else { 0 };
         let bar_top = axis_top + axis_px + look.px(5);
         let own_bar_px = if shared { 0 } else { bar::height(look) + look.px(2) };
-        let range_top = bar_top + own_bar_px;
-        let warning_top = range_top + spaced(tallest(&ranges), look.px(3));
-        let caption_top = warning_top + spaced(tallest(&warnings), look.px(3));
-        let common_top = caption_top + spaced(tallest(&captions), look.px(6));
+        let text_top = bar_top + own_bar_px;
+        // Texts of a panel follow each other.
+        let text_px = |column: usize| {
+            let blocks = [&ranges[column], &warnings[column], &captions[column]];
+            blocks.map(|block| spaced(block.height(), look.px(3))).iter().sum::<u32>()
+        };
+        let most_text = (0..panels.len()).map(text_px).max().unwrap_or(0);
+        let common_top = text_top + most_text + look.px(4);
         let common_px = if shared { bar::height(look) + common.height() + look.px(4) } else { 0 };
         let height = common_top + common_px + look.px(8);
 
@@ -271,9 +275,11 @@ impl SideBySide {
                     if is_alone { wide.max(look.px(LEAST)) } else { edge },
                 );
             }
-            ranges[column].draw(&mut canvas, left, range_top);
-            warnings[column].draw(&mut canvas, left, warning_top);
-            captions[column].draw(&mut canvas, left, caption_top);
+            let mut top = text_top;
+            for block in [&ranges[column], &warnings[column], &captions[column]] {
+                block.draw(&mut canvas, left, top);
+                top += spaced(block.height(), look.px(3));
+            }
         }
         if shared {
             let wide = panels.len() as u32 * (edge + 2 * look.px(1) + look.px(GAP)) - look.px(GAP);

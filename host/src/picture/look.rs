@@ -141,15 +141,16 @@ pub(super) struct Palette {
 /// Number of colours of curves. Later curves have these colours with other dashes.
 pub(super) const CURVE_COLOURS: usize = 5;
 
+/// Greys are without a tint: pictures without curves and warnings have at most 256 colours.
 const LIGHT: Palette = Palette {
     ground: [255, 255, 255],
-    grid: [225, 227, 231],
-    frame: [140, 144, 152],
-    strong: [20, 20, 24],
-    plain: [50, 52, 58],
-    faint: [84, 88, 96],
+    grid: [227; 3],
+    frame: [144; 3],
+    strong: [20; 3],
+    plain: [52; 3],
+    faint: [88; 3],
     warning: [168, 66, 0],
-    curves: [[0, 94, 162], [213, 94, 0], [0, 158, 115], [136, 34, 85], [20, 20, 24]],
+    curves: [[0, 94, 162], [213, 94, 0], [0, 158, 115], [136, 34, 85], [20; 3]],
 };
 
 const DARK: Palette = Palette {

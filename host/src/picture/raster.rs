@@ -39,7 +39,11 @@ impl Drawing {
     }
 }
 
+/// Steps from the ground to the ink. Few steps make few colours, and smaller files.
+const STEPS: f64 = 16.0;
+
 fn blend(ground: &mut Rgb<u8>, ink: Colour, coverage: f64) {
+    let coverage = (coverage * STEPS).round() / STEPS;
     for (ground, ink) in ground.0.iter_mut().zip(ink) {
         let mixed =
             f64::from(*ground) + (f64::from(ink) - f64::from(*ground)) * coverage.clamp(0.0, 1.0);

@@ -15,8 +15,8 @@ impl Drawing {
         let mm = |px: u32| f64::from(px) / self.dpi * 25.4;
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{:.2}mm\" height=\"{:.2}mm\" \
-             viewBox=\"0 0 {width} {height}\" font-family=\"Ubuntu, 'DejaVu Sans', Arial, sans-serif\" \
-             font-weight=\"300\">\n<desc>{}</desc>\n<metadata>{}</metadata>\n\
+             viewBox=\"0 0 {width} {height}\" font-family=\"'Ubuntu Light', Ubuntu, Arial, 'DejaVu Sans', \
+             sans-serif\">\n<desc>{}</desc>\n<metadata>{}</metadata>\n\
              <rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>\n",
             mm(width),
             mm(height),
