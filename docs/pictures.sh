@@ -4,16 +4,16 @@
 # quick (default): the pictures of `nirspi` commands, a minute. long: those of studies on DATA (docs/data.md; default
 # $NIRSPI_DATA), about an hour on two cores. Notebooks: .ci/run python with NIRSPI_BLESS=1. docs/serve.png and docs/browser.png:
 # host/cli/tests/browser/check.py and host/web/build.sh.
-# NIRSPI is the program; NIRSPI_EXAMPLES the folder of the built examples.
+# First: cargo build --release, and for long: cargo build --release -p nirspi-eval --examples. NIRSPI_CLI is another program
+# than that of the target folder; its examples lie beside it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 docs=$PWD/docs
 what=${1:-quick}
 data=${2:-${NIRSPI_DATA:-}}
 target=${CARGO_TARGET_DIR:-target}
-nirspi=${NIRSPI:-$target/release/nirspi}
-examples=${NIRSPI_EXAMPLES:-$target/release/examples}
-nirspi=$(realpath "$nirspi")
+nirspi=$(realpath "${NIRSPI_CLI:-$target/release/nirspi}")
+examples=$(dirname "$nirspi")/examples
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -42,7 +42,6 @@ quick() {
 long() {
     [ -n "$data" ] || { echo "expected DATA, or NIRSPI_DATA"; exit 2; }
     data=$(realpath "$data")
-    examples=$(realpath "$examples")
     cd "$work"
     "$examples/video" video
     cp video/{video,video_curves}.png video/image.apng "$docs/reconstruction"

@@ -50,4 +50,6 @@ pub use trace::of_trace;
 pub use video::of_images as video;
 
 #[cfg(test)]
+mod checks;
+#[cfg(test)]
 mod tests;
