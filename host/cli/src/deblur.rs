@@ -120,8 +120,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let (Some(target), Some(spread)) = (spread, &result.spread) {
         target.write(deblur::SIDE, spread, &provenance)?;
     }
-    let images = (deblur::SIDE, &*result.images);
-    let shown = args.images.write(&target, images, "deblurred", &provenance)?;
+    let shown = target.write_and_show(deblur::SIDE, &result.images, "deblurred", &provenance)?;
 
     let (steps, consistency) = match way {
         Way::Network(method) => (method.steps().get(), options.consistency),

@@ -101,8 +101,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let shown = intervals.of(&result, &readings)?;
         target.write(2 * fusion::SIDE, &shown, &provenance)?;
     }
-    let images = (2 * fusion::SIDE, &*result.images);
-    let shown = args.images.write(&target, images, "enhanced", &provenance)?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &result.images, "enhanced", &provenance)?;
 
     let steps = args.steps.get();
     let deblurring = Deblurring::of("diffusion", steps, options.consistency, options.seed, &result);

@@ -6,7 +6,6 @@ use anyhow::{Context, Result};
 use nirspi::imaging::stack::{ImageStack, StackTarget};
 use nirspi::imaging::{Deblurring, StackReport};
 use nirspi::picture::Pictures;
-use nirspi::provenance::Provenance;
 use nirspi_nets::{Arithmetic, Backend, Device, Images, Networks, WeightsError};
 use nirspi_recon::words::count_of;
 use std::path::{Path, PathBuf};
@@ -63,20 +62,9 @@ impl ImageArgs {
         Ok(images)
     }
 
-    /// Writes the results with this title, and a picture beside them.
-    pub fn write(
-        &self,
-        target: &StackTarget,
-        (side, images): (usize, &[f32]),
-        title: &str,
-        provenance: &Provenance,
-    ) -> Result<Pictures> {
-        Ok(target.write_and_show(side, images, title, self.figure.figure, provenance)?)
-    }
-
     /// Where the results of these images go, or further results of theirs.
     pub fn target(&self, images: &ImageStack, out: &Path) -> Result<StackTarget> {
-        Ok(images.target(out, self.overwrite.overwrite)?)
+        Ok(images.target(out, self.overwrite.overwrite)?.with_figure(self.figure.figure))
     }
 }
 

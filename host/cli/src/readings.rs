@@ -4,7 +4,7 @@ use super::report::{FigureArgs, Overwrite, ReportArgs, words};
 use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::files::measurement::write_readings;
-use nirspi::files::output::{Existing, write_result};
+use nirspi::files::output::Existing;
 use nirspi::files::trace::{self, Cut, Raw};
 use nirspi::picture::{Figure, of_trace};
 use nirspi::provenance::Taken;
@@ -95,9 +95,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let picture = out.with_extension("picture.png");
     let existing = Existing::of(args.overwrite.overwrite, Some(&args.trace));
     existing.check(out)?;
-    for ending in ["png", "svg", "pdf", "csv"] {
-        existing.check(&picture.with_extension(ending))?;
-    }
+    Figure::paths_of_chart(&picture).iter().try_for_each(|path| existing.check(path))?;
     let cut = Cut {
         field: args.field.clone(),
         trigger: args.trigger.clone(),
@@ -110,8 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let found = trace::read(&args.trace, &cut)?;
     let provenance = Taken::of_file(&args.trace, None).made(provenance::made());
-    let drawn =
-        Figure::from(of_trace(&found, String::new())).files(args.figure.figure, &provenance);
+    let figure = Figure::from(of_trace(&found, String::new()));
     let report = Report {
         input: args.trace.clone(),
         output: out.clone(),
@@ -129,9 +126,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         extra_edges: found.extra,
     };
     write_readings(out, existing, &found.readings, &provenance)?;
-    for (ending, bytes) in drawn {
-        write_result(&report.picture.with_extension(ending), existing, &bytes)?;
-    }
+    figure.write_files(&report.picture, existing, args.figure.figure, &provenance)?;
     args.report.print(&report, &provenance, |report| {
         report.words.iter().try_for_each(print::line)?;
         report.warnings.iter().for_each(print::warning);

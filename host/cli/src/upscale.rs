@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("upscaling", input.count(), "images");
     let large = times.time("upscale", || fusion.upscale(images, depth.as_ref()));
     drop(bar);
-    let shown = args.images.write(&target, (2 * fusion::SIDE, &*large), "upscaled", &provenance)?;
+    let shown = target.write_and_show(2 * fusion::SIDE, &large, "upscaled", &provenance)?;
 
     let report = args.images.report(&input, &networks, None, shown, times);
     args.images.report.print(&report, &provenance, |report| {

@@ -13,9 +13,10 @@ use super::look::{FigureStyle, Look};
 use super::signature::signed;
 use crate::files::FileError;
 use crate::files::image::{encode_labelled, encode_rgb};
-use crate::files::output::OutputDir;
+use crate::files::output::{Existing, OutputDir, write_result};
 use crate::provenance::Provenance;
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
 
 /// What a figure shows.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,6 +137,33 @@ impl Figure {
     ) -> Result<(), FileError> {
         let mut files = self.files(style, provenance).into_iter();
         files.try_for_each(|(ending, bytes)| out.write(&format!("{name}.{ending}"), &bytes))
+    }
+
+    /// The files that a chart `NAME.png` has, itself included.
+    #[must_use]
+    pub fn paths_of_chart(png: &Path) -> [PathBuf; 4] {
+        ["png", "svg", "pdf", "csv"].map(|ending| png.with_extension(ending))
+    }
+
+    /// Writes the files of the figure beside each other: the PNG of this name, and the same with
+    /// other endings.
+    ///
+    /// # Errors
+    /// [`FileError`] names the file and the system's reason.
+    ///
+    /// # Panics
+    /// As [`draw`](Self::draw).
+    pub fn write_files(
+        &self,
+        png: &Path,
+        existing: Existing<'_>,
+        style: FigureStyle,
+        provenance: &Provenance,
+    ) -> Result<(), FileError> {
+        let mut files = self.files(style, provenance).into_iter();
+        files.try_for_each(|(ending, bytes)| {
+            write_result(&png.with_extension(ending), existing, &bytes)
+        })
     }
 
     /// The points of all curves, a row each; `None` without a chart.
