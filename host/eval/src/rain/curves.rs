@@ -317,10 +317,20 @@ mod tests {
                     "{name}, {line}: {inside}"
                 );
             }
-            let csv = all.iter().find(|curves| curves.name == *name).unwrap().csv();
-            let points: usize = chart.lines.iter().map(|line| line.points.len()).sum();
-            assert_eq!(csv.lines().count(), 1 + points, "{name}");
         }
+    }
+
+    #[test]
+    fn the_rain_asked_for_has_one_curve_if_it_is_one_of_the_others() {
+        let names = |drops: &Drops| {
+            let all = curves("asked", drops, &[550.0]).unwrap();
+            let lines = all[0].chart.lines.iter();
+            lines.map(|line| line.name.clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(names(&Drops::gamma(5.6, 2.0, 3.0).unwrap()).len(), 5);
+        let found = names(&Drops::marshall_palmer(PaperRain::HEAVY.rate_mm_per_h).unwrap());
+        assert_eq!(found.len(), 4, "{found:?}");
+        assert!(!found.contains(&"Marshall-Palmer, 5.6 mm/h".to_owned()), "{found:?}");
     }
 
     #[test]
