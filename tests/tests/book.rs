@@ -206,11 +206,11 @@ const OF_A_BROWSER: [&str; 2] = ["browser.png", "serve.png"];
 /// Width of a figure for paper, 178 mm or 85 mm at 300 dpi.
 const PAPER_PX: [u32; 2] = [2102, 1004];
 
-/// The PNG files of a folder and of the folders in it, but for notebooks, whose cells make them.
+/// The PNG files of a folder and of the folders in it, but for notebooks, whose cells make them, and the engineering log's own.
 fn pictures(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut found = Vec::new();
-    for path in entries.filter(|path| !path.ends_with("notebooks")) {
+    for path in entries.filter(|path| !path.ends_with("notebooks") && !path.ends_with("docs/log")) {
         match path.is_dir() {
             true => found.extend(pictures(&path)),
             false if path.extension().is_some_and(|ending| ending == "png") => found.push(path),
