@@ -1,7 +1,7 @@
 //! The camera's range in rain by physics and by Algorithm 2 as printed, compared with the paper's
 //! Table 2.
 
-use crate::camera_model::{resolution_chart, snr_chart};
+use crate::camera_model::{distance_axis, resolution_chart, snr_chart};
 use crate::error::{EvalError, Result};
 use nirspi::picture::{Axis, Chart, Figure, Line};
 use nirspi_optics::CameraModel;
@@ -397,17 +397,6 @@ pub fn exposure_chart(settings: &Settings) -> Result<Chart> {
         points: PAPER_EXPOSURES.to_vec(),
     });
     Ok(exposures_against_distance(lines))
-}
-
-/// The axis of charts against the distance of the target.
-pub(crate) fn distance_axis() -> Axis {
-    Axis {
-        name: "distance, m".to_owned(),
-        from: 0.2,
-        to: 2.0,
-        logarithmic: true,
-        ticks: vec![0.2, 0.3, 0.6, 1.0, 2.0],
-    }
 }
 
 fn exposures_against_distance(lines: Vec<Line>) -> Chart {

@@ -39,13 +39,8 @@ struct Air {
     drops: Drops,
 }
 
-/// All curves: of `drops`, called `name`, of the paper's two rains, of Marshall and Palmer's rain
-/// at the heavier rate, and of fog. `wavelengths_nm` are those of the curves over size.
-///
-/// # Errors
-/// [`EvalError::is_setting`] for a wavelength without an index of water, or drops that are not
-/// possible.
-pub fn curves(name: &str, drops: &Drops, wavelengths_nm: &[f64]) -> Result<Vec<Curves>> {
+/// The air of the drops asked for, and of those beside them.
+fn airs(name: &str, drops: &Drops) -> Result<Vec<Air>> {
     let air = |name: &str, drops| Air { name: name.to_owned(), drops };
     let heavy = PaperRain::HEAVY.rate_mm_per_h;
     let asked = air(&format!("{name} (asked for)"), drops.clone());
@@ -57,7 +52,17 @@ pub fn curves(name: &str, drops: &Drops, wavelengths_nm: &[f64]) -> Result<Vec<C
     ];
     // The rain asked for may be one of the others.
     let others = others.into_iter().filter(|other| other.drops != *drops);
-    let airs: Vec<Air> = std::iter::once(asked).chain(others).collect();
+    Ok(std::iter::once(asked).chain(others).collect())
+}
+
+/// All curves: of `drops`, called `name`, of the paper's two rains, of Marshall and Palmer's rain
+/// at the heavier rate, and of fog. `wavelengths_nm` are those of the curves over size.
+///
+/// # Errors
+/// [`EvalError::is_setting`] for a wavelength without an index of water, or drops that are not
+/// possible.
+pub fn curves(name: &str, drops: &Drops, wavelengths_nm: &[f64]) -> Result<Vec<Curves>> {
+    let airs = airs(name, drops)?;
     let mut all = over_wavelength(&airs)?;
     all.extend(over_size(wavelengths_nm)?);
     all.push(sizes(&airs));
@@ -322,10 +327,8 @@ mod tests {
 
     #[test]
     fn the_rain_asked_for_has_one_curve_if_it_is_one_of_the_others() {
-        let names = |drops: &Drops| {
-            let all = curves("asked", drops, &[550.0]).unwrap();
-            let lines = all[0].chart.lines.iter();
-            lines.map(|line| line.name.clone()).collect::<Vec<_>>()
+        let names = |drops: &Drops| -> Vec<String> {
+            airs("asked", drops).unwrap().into_iter().map(|air| air.name).collect()
         };
         assert_eq!(names(&Drops::gamma(5.6, 2.0, 3.0).unwrap()).len(), 5);
         let found = names(&Drops::marshall_palmer(PaperRain::HEAVY.rate_mm_per_h).unwrap());
