@@ -9,7 +9,7 @@
 //! memory as FOLDER/memory.png. Exit code 1 at the first frame that is not accounted for.
 
 use nirspi::capture::{Calibration, CaptureOptions, Ended, capture};
-use nirspi::picture::{Axis, Chart, Line};
+use nirspi::picture::{Axis, Chart, Figure, FigureStyle, Line};
 use nirspi::provenance::{Made, Origin, Taken};
 use nirspi::recording::Target;
 use nirspi::session::Session;
@@ -222,7 +222,7 @@ fn main() -> Result<(), Failure> {
     } else {
         let made = Made::now("soak", None, std::env::args());
         let provenance = Taken::without_camera(Origin::Simulated).made(&made);
-        let picture = nirspi::picture::signed_png(&chart(&points).render(), &provenance);
+        let picture = Figure::from(chart(&points)).png(&FigureStyle::Paper.look(), &provenance);
         std::fs::write(folder.join("memory.png"), picture)?;
     }
     Ok(())

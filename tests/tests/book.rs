@@ -200,3 +200,44 @@ fn a_broken_link_is_found_and_a_link_in_code_is_none() {
     assert_eq!(links(page), ["a.md", "c.png"]);
     assert!(anchors(page).is_empty());
 }
+
+/// Pictures that no command of `docs/pictures.sh` makes: those of a browser.
+const OF_A_BROWSER: [&str; 2] = ["browser.png", "serve.png"];
+/// Width of a figure for paper, 178 mm or 85 mm at 300 dpi.
+const PAPER_PX: [u32; 2] = [2102, 1004];
+
+/// The PNG files of a folder and of the folders in it, but for notebooks, whose cells make them, and the engineering log's own.
+fn pictures(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut found = Vec::new();
+    for path in entries.filter(|path| !path.ends_with("notebooks") && !path.ends_with("docs/log")) {
+        match path.is_dir() {
+            true => found.extend(pictures(&path)),
+            false if path.extension().is_some_and(|ending| ending == "png") => found.push(path),
+            false => {}
+        }
+    }
+    found
+}
+
+#[test]
+fn one_script_makes_every_picture_of_the_pages_for_paper() {
+    let script = read(&root().join("docs/pictures.sh"));
+    let words: BTreeSet<&str> =
+        script.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
+    let mut count = 0;
+    for path in pictures(&root().join("docs")) {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if OF_A_BROWSER.contains(&name) {
+            continue;
+        }
+        let stem = path.file_stem().unwrap().to_str().unwrap();
+        assert!(words.contains(stem), "docs/pictures.sh does not make {}", path.display());
+        // The width stands in the first chunk of a PNG.
+        let bytes = std::fs::read(&path).unwrap();
+        let width = u32::from_be_bytes(bytes[16..20].try_into().unwrap());
+        assert!(PAPER_PX.contains(&width), "{}: {width} pixels wide", path.display());
+        count += 1;
+    }
+    assert!(count >= 18, "{count} pictures");
+}

@@ -2,7 +2,7 @@
 
 use super::calibration::CalibrationArgs;
 use super::camera::{self, CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
-use super::report::ReportArgs;
+use super::report::{FigureArgs, ReportArgs};
 use super::{Usage, address, feed, print, progress, provenance};
 use anyhow::Result;
 use nirspi::capture::{
@@ -50,23 +50,23 @@ pub struct Args {
     calibration: CalibrationArgs,
     /// Frames to measure [default: until Ctrl-C]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    frames: Option<u32>,
+    pub(super) frames: Option<u32>,
     #[arg(long, value_name = "TIME", conflicts_with = "frames", allow_hyphen_values = true, help = LIGHT_HELP)]
     light: Option<Light>,
     /// Seconds to measure, not counting the calibration. A recording that ends after this time is complete
     #[arg(long, value_name = "S", conflicts_with_all = ["frames", "light"], allow_hyphen_values = true)]
-    seconds: Option<Seconds>,
+    pub(super) seconds: Option<Seconds>,
     #[command(flatten)]
     setup: SetupArgs,
     #[command(flatten)]
     scene: SceneArgs,
     /// File to record into [default: the first of capture-1.mcap, capture-2.mcap, ... that does not exist; of a feed, .npz]
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// Replace an existing file. The existing file stays until the new recording is complete. Until then the new recording is
     /// NAME.new.mcap in the same folder
     #[arg(long)]
-    overwrite: bool,
+    pub(super) overwrite: bool,
     /// Record into several files, NAME-0001.mcap, NAME-0002.mcap and so on. The next file begins before a file is larger than a
     /// size (500MB, 2GB) or after a time (90s, 10min, 1h). Each file is a complete recording. None of the names may exist
     #[arg(
@@ -79,17 +79,16 @@ pub struct Args {
     /// After the recording, make an image of its frames, enlarge and deblur the image, and write both into this folder, as
     /// `nirspi reconstruct --enhance` does. Of a feed, images of 32 x 32 and 64 x 64 are enlarged and deblurred
     #[arg(long, value_name = "DIR")]
-    picture: Option<PathBuf>,
+    pub(super) picture: Option<PathBuf>,
     #[command(flatten)]
-    report: ReportArgs,
+    pub(super) figure: FigureArgs,
+    #[command(flatten)]
+    pub(super) report: ReportArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(address) = args.camera.feed() {
-        let Args { frames, seconds, overwrite, report, .. } = *args;
-        let (out, picture) = (args.out.as_deref(), args.picture.as_deref());
-        let of = feed::Capture { address, frames, seconds, out, overwrite, picture, report };
-        return feed::capture(&of);
+        return feed::capture(address, args);
     }
     let mut setup = args.setup.setup(Sampling::ALL, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
@@ -146,7 +145,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         if let Some(kept) = choice.flat_field.clone() {
             source = source.with_flat_field(kept);
         }
-        super::reconstruct::picture(source, path, out, args.report.json)?;
+        super::reconstruct::picture(source, path, out, args.figure, args.report.json)?;
     }
     Ok(code)
 }

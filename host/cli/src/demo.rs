@@ -5,7 +5,7 @@ use super::method::MethodArgs;
 use super::print;
 use super::progress::Progress;
 use super::provenance;
-use super::report::{ReportArgs, StageTimes, stages};
+use super::report::{FigureArgs, ReportArgs, StageTimes, stages, words};
 use anyhow::{Context, Result};
 use nirspi::account::LossCounters;
 use nirspi::exposure::{Length, Light};
@@ -19,7 +19,9 @@ use nirspi::picture::Pictures;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::words::{count, count_of};
 use nirspi_recon::{Image, Measurements, Sampling};
-use nirspi_virtual::{Bench, CameraModel, Panels, SCENE_PX, Seen, SeenImage, Stages, StagesReport};
+use nirspi_virtual::{
+    Bench, CameraModel, Panels, SCENE_PX, Seen, SeenImage, Shown, Stages, StagesReport,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,7 +33,7 @@ use std::process::ExitCode;
 /// bit-exact model; firmware logic and wire protocol are those of a real camera. The program calibrates the virtual camera
 /// against a white sheet, and measures a white sheet in place of the scene: every image is in shares of that white, as it is,
 /// with its noise. Scores compare an image with the scene after a fit of gain and offset, which stands beside them; no image
-/// is fitted. The command writes the scene and the image of every stage as PNG and NPY, side_by_side.png, report.json, and
+/// is fitted. The command writes the scene and the image of every stage as PNG and NPY, side_by_side.png (and .svg, .pdf), report.json, and
 /// measurement.npz and frames.npy to try other commands on.
 ///
 /// A capture that loses frames ends with exit code 1, and nothing is written.
@@ -57,6 +59,11 @@ pub struct Args {
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "demo")]
     out: PathBuf,
+    /// Images of side_by_side.png, in this order [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words(&Shown::ALL, Shown::named))]
+    panels: Vec<Shown>,
+    #[command(flatten)]
+    figure: FigureArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -195,7 +202,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         stages: &stages,
     };
     let provenance = provenance::of_camera(&camera);
-    let pictures = panels.pictures(&provenance);
+    let pictures = panels.pictures(&args.panels, args.figure.figure, &provenance);
     let report = Report {
         scene: map.name.clone(),
         simulated: true,

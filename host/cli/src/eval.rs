@@ -10,12 +10,12 @@ mod table4;
 use super::camera::{LIGHT_HELP, ModelArgs, Rain, WeatherArgs, exposure};
 use super::provenance;
 use super::range;
-use super::report::ReportArgs;
+use super::report::{FigureArgs, ReportArgs};
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use nirspi::exposure::{Length, Light};
 use nirspi::files::output::OutputDir;
-use nirspi::picture::{RgbImage, signed_png};
+use nirspi::picture::Figure;
 use nirspi::setup::MeasurementSetup;
 use nirspi_eval::pictures::ANCESTRAL_STEPS;
 use nirspi_eval::shot;
@@ -115,27 +115,29 @@ struct AncestralArgs {
 /// Where a table's report goes.
 #[derive(Debug, Args)]
 struct OutputArgs {
-    /// Folder for the report as JSON and its picture
+    /// Folder for the report as JSON and its figure
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    figure: FigureArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
 
 impl OutputArgs {
-    /// Writes `NAME.json` and `NAME.png` into the folder, if one is named, and prints the report as JSON or in words.
+    /// Writes `NAME.json` and the figure `NAME` into the folder, if one is named, and prints the report as JSON or in words.
     fn hand_over<R: Serialize>(
         &self,
         name: &str,
         report: &R,
-        picture: impl FnOnce() -> Result<RgbImage>,
+        picture: impl FnOnce() -> Result<Figure>,
         say: impl FnOnce(&R) -> Result<()>,
     ) -> Result<ExitCode> {
         let provenance = provenance::simulated();
         if let Some(path) = &self.out {
             let mut out = OutputDir::create(path)?;
             out.write(&format!("{name}.json"), provenance.sign(report)?.as_bytes())?;
-            out.write(&format!("{name}.png"), &signed_png(&picture()?, &provenance))?;
+            picture()?.write(&mut out, name, self.figure.figure, &provenance)?;
             out.commit()?;
         }
         self.report.print(report, &provenance, say)

@@ -1,7 +1,7 @@
 //! Feeds, the live readings of any bench: `nirspi capture --camera feed:ADDR`.
 
+use super::capture::Args;
 use super::progress::Progress;
-use super::report::ReportArgs;
 use super::{Usage, print, provenance, reconstruct, settings};
 use anyhow::{Context, Result, bail};
 use nirspi::capture::{FeedProgress, FeedReport, Seconds, StopCause, record_feed};
@@ -18,20 +18,11 @@ use std::sync::atomic::Ordering;
 const EVERYWHERE: [&str; 7] =
     ["camera", "json", "quiet", "strict", "verbose", "settings", "save-settings"];
 
-/// A capture of a feed.
-pub struct Capture<'a> {
-    pub address: &'a Address,
-    pub frames: Option<u32>,
-    pub seconds: Option<Seconds>,
-    pub out: Option<&'a Path>,
-    pub overwrite: bool,
-    pub picture: Option<&'a Path>,
-    pub report: ReportArgs,
-}
-
-pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
-    let Capture { address, frames, seconds, out, overwrite, picture, report } = *args;
-    refuse_others(&["frames", "seconds", "out", "overwrite", "picture"])?;
+/// Records a feed as the options of `capture` ask.
+pub fn capture(address: &Address, args: &Args) -> Result<ExitCode> {
+    let Args { frames, seconds, overwrite, figure, report, .. } = *args;
+    let (out, picture) = (args.out.as_deref(), args.picture.as_deref());
+    refuse_others(&["frames", "seconds", "out", "overwrite", "picture", "figure"])?;
     let out = match out {
         Some(out) if out.extension().is_none_or(|extension| extension != "npz") => {
             let out = out.display();
@@ -72,7 +63,7 @@ pub fn capture(args: &Capture<'_>) -> Result<ExitCode> {
     report.print(&recorded, &provenance, say)?;
     if let (Some(folder), Some(file)) = (picture, recorded.files.first()) {
         let source = Source::of_feed(feed.header(), file, recorded.mean.readings())?;
-        reconstruct::picture(source, file, folder, report.json)?;
+        reconstruct::picture(source, file, folder, figure, report.json)?;
     }
     match &recorded.missing {
         None => Ok(ExitCode::SUCCESS),

@@ -12,12 +12,15 @@ const HEADINGS: [(&str, &[&str]); 5] = [
     ),
     ("Input", &["resize", "depth"]),
     ("Networks", &["ancestral"]),
-    ("Output", &["out", "overwrite", "picture", "json"]),
+    ("Output", &["out", "overwrite", "picture", "panels", FIGURE, "json"]),
     ("Every command", &EVERY_COMMAND),
 ];
 
 /// Options of all commands, which `-h` leaves out.
 const EVERY_COMMAND: [&str; 5] = ["quiet", "verbose", "strict", "settings", "save-settings"];
+
+/// How figures are drawn: `-h` shows it where it is chosen.
+const FIGURE: &str = "figure";
 
 /// The most options that `-h` shows of a command, beside `-h` itself.
 const SHOWN_SHORT: usize = 11;
@@ -26,7 +29,18 @@ const SHOWN_SHORT: usize = 11;
 const SHORT: [(&str, &[&str]); 11] = [
     (
         "demo",
-        &["scene", "distance-m", "rain", "light", "sampling", "method", "seed", "out", "json"],
+        &[
+            "scene",
+            "distance-m",
+            "rain",
+            "light",
+            "sampling",
+            "method",
+            "seed",
+            "out",
+            FIGURE,
+            "json",
+        ],
     ),
     (
         "reconstruct",
@@ -147,13 +161,16 @@ fn command(command: Command) -> Command {
         let is_option = arg.get_action().takes_values() && !arg.is_positional();
         if is_option { arg.allow_negative_numbers(true) } else { arg }
     };
-    let options = command.get_opts().count() + command.get_arguments().filter(is_flag).count();
+    let flags = command.get_arguments().filter(is_flag).count();
+    let options = command.get_opts().filter(|arg| arg.get_long() != Some(FIGURE)).count() + flags;
     let chosen =
         SHORT.iter().find(|(name, _)| *name == command.get_name()).map(|(_, names)| *names);
     let is_long = |arg: &Arg| {
         let Some(name) = arg.get_long().filter(|_| !arg.is_positional()) else { return false };
+        let is_chosen = chosen.is_some_and(|chosen| chosen.contains(&name));
         EVERY_COMMAND.contains(&name)
-            || options > SHOWN_SHORT && chosen.is_some_and(|chosen| !chosen.contains(&name))
+            || name == FIGURE && !is_chosen
+            || options > SHOWN_SHORT && chosen.is_some() && !is_chosen
     };
     let shorten = |arg: Arg| {
         let hidden = is_long(&arg);

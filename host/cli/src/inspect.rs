@@ -1,6 +1,6 @@
 //! `nirspi inspect`: what is in a file of readings, and the command that reconstructs it.
 
-use super::report::{Overwrite, ReportArgs};
+use super::report::{FigureArgs, Overwrite, ReportArgs};
 use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::files::output::Existing;
@@ -29,6 +29,8 @@ pub struct Args {
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -45,8 +47,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let provenance = found.taken.clone().made(provenance::made());
     let picture = args.out.as_ref().zip(found.picture());
     if let Some((out, picture)) = &picture {
-        let mut pictures = Pictures::new(&provenance);
-        pictures.add(&out.display().to_string(), picture);
+        let mut pictures = Pictures::new(args.figure.figure, &provenance);
+        pictures.add(&out.display().to_string(), picture.clone());
         pictures.write_files(existing)?;
     }
     args.report.print(&found, &provenance, |found| {

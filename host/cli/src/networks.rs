@@ -1,6 +1,6 @@
 //! The common parts of commands that run networks: weights, device, progress, report.
 
-use super::report::{Overwrite, ReportArgs, StageTimes};
+use super::report::{FigureArgs, Overwrite, ReportArgs, StageTimes};
 use super::{Usage, print};
 use anyhow::{Context, Result};
 use nirspi::imaging::stack::{ImageStack, StackTarget};
@@ -43,6 +43,8 @@ pub struct ImageArgs {
     #[command(flatten)]
     pub networks: NetworkArgs,
     #[command(flatten)]
+    pub figure: FigureArgs,
+    #[command(flatten)]
     pub report: ReportArgs,
 }
 
@@ -62,7 +64,7 @@ impl ImageArgs {
 
     /// Where the results of these images go, or further results of theirs.
     pub fn target(&self, images: &ImageStack, out: &Path) -> Result<StackTarget> {
-        Ok(images.target(out, self.overwrite.overwrite)?)
+        Ok(images.target(out, self.overwrite.overwrite)?.with_figure(self.figure.figure))
     }
 }
 

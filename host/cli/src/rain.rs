@@ -3,11 +3,11 @@
 
 use super::camera::ModelArgs;
 use super::{Usage, print, provenance, refused};
-use crate::report::ReportArgs;
+use crate::report::{FigureArgs, ReportArgs};
 use anyhow::{Context, Result};
 use nirspi::files::output::OutputDir;
 use nirspi::files::table::Table;
-use nirspi::picture::signed_png;
+use nirspi::picture::Figure;
 use nirspi_eval::rain::budget::{self, Settings, Term};
 use nirspi_eval::rain::{self, RainReport, curves, rig};
 use nirspi_optics::mie::Index;
@@ -19,8 +19,8 @@ use std::process::ExitCode;
 /// Say what rain or fog does to light: extinction, scattering and absorption at each wavelength
 ///
 /// The refractive index of water is Segelstein's, 400 to 2000 nm. --out writes curves of these against wavelength and drop
-/// size, of drop sizes and fall speeds, and of extinction against rain rate beside laws of measured optical links, each as
-/// PNG and CSV, and rain.json.
+/// size, of drop sizes and fall speeds, and of extinction against rain rate beside laws of measured optical links, and
+/// rain.json.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi physics rain --rate-mm-h 5.6\n\
@@ -28,9 +28,11 @@ use std::process::ExitCode;
 pub struct Args {
     #[command(flatten)]
     weather: WeatherArgs,
-    /// Folder for curves of rain, as PNG and CSV, and rain.json
+    /// Folder for figures of rain, each with its points as CSV, and rain.json
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    figure: FigureArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -149,9 +151,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let provenance = provenance::simulated();
         let mut out = OutputDir::create(path)?;
         for curves in &curves {
-            let picture = signed_png(&curves.chart.render(), &provenance);
-            out.write(&format!("{}.png", curves.name), &picture)?;
-            out.write(&format!("{}.csv", curves.name), curves.csv().as_bytes())?;
+            let figure = Figure::from(curves.chart.clone());
+            figure.write(&mut out, curves.name, args.figure.figure, &provenance)?;
         }
         out.write("rain.json", provenance.sign(&report)?.as_bytes())?;
         out.commit()?;
@@ -160,7 +161,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         say(report)?;
         args.out.as_ref().map_or(Ok(()), |path| {
             let path = path.display();
-            print::line(format_args!("wrote curves as PNG and CSV, and rain.json, to {path}"))
+            print::line(format_args!("wrote figures and rain.json to {path}"))
         })
     })
 }

@@ -2,12 +2,10 @@
 
 use super::camera::ModelArgs;
 use super::{print, provenance, refused};
-use crate::report::ReportArgs;
+use crate::report::{FigureArgs, ReportArgs};
 use anyhow::Result;
 use nirspi::files::output::OutputDir;
-use nirspi::picture::signed_png;
-use nirspi_eval::camera_model::{resolution_chart, snr_chart};
-use nirspi_eval::range::{Report, Settings, exposure_chart, picture, range};
+use nirspi_eval::range::{Report, Settings, figures, range};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -39,6 +37,8 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -53,11 +53,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let provenance = provenance::simulated();
     if let Some(out) = &args.out {
         let mut out = OutputDir::create(out)?;
-        out.write("range.png", &signed_png(&picture(&settings)?, &provenance))?;
-        out.write("exposure.png", &signed_png(&exposure_chart(&settings)?.render(), &provenance))?;
-        let camera = &settings.camera;
-        out.write("resolution.png", &signed_png(&resolution_chart(camera)?.render(), &provenance))?;
-        out.write("snr.png", &signed_png(&snr_chart(camera)?.render(), &provenance))?;
+        for (name, figure) in figures(&settings)? {
+            figure.write(&mut out, name, args.figure.figure, &provenance)?;
+        }
         out.write("range.json", provenance.sign(&report)?.as_bytes())?;
         out.commit()?;
     }

@@ -1,12 +1,12 @@
 //! `nirspi readings`: readings of a trace, for `nirspi reconstruct`.
 
-use super::report::{Overwrite, ReportArgs, words};
+use super::report::{FigureArgs, Overwrite, ReportArgs, words};
 use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::files::measurement::write_readings;
-use nirspi::files::output::{Existing, write_result};
+use nirspi::files::output::Existing;
 use nirspi::files::trace::{self, Cut, Raw};
-use nirspi::picture::{of_trace, signed_png};
+use nirspi::picture::{Figure, of_trace};
 use nirspi::provenance::Taken;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ use std::process::ExitCode;
 /// A reading is the mean of the samples of one pattern. A pattern begins where the trigger rises (--trigger), or every K
 /// samples (--samples). The trace is a .npz, .npy, .mat, .h5, .csv or .txt file with the samples in time order, or numbers
 /// without a heading (--raw). An array of K samples a reading, (M, K), is a trace, too. The command writes the readings as y in
-/// a .npz file for `nirspi reconstruct`, and beside it a picture of the first readings (OUT.picture.png), which shows where
+/// a .npz file for `nirspi reconstruct`, and beside it a figure of the first readings (OUT.picture.png), which shows where
 /// they begin and end. A pattern whose trigger is missing has no reading (NaN). The number of readings is compared with that
 /// of a full sweep.
 #[derive(Debug, clap::Args)]
@@ -60,6 +60,8 @@ pub struct Args {
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -93,7 +95,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let picture = out.with_extension("picture.png");
     let existing = Existing::of(args.overwrite.overwrite, Some(&args.trace));
     existing.check(out)?;
-    existing.check(&picture)?;
+    Figure::paths_of_chart(&picture).iter().try_for_each(|path| existing.check(path))?;
     let cut = Cut {
         field: args.field.clone(),
         trigger: args.trigger.clone(),
@@ -106,7 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let found = trace::read(&args.trace, &cut)?;
     let provenance = Taken::of_file(&args.trace, None).made(provenance::made());
-    let drawn = signed_png(&of_trace(&found, String::new()).render(), &provenance);
+    let figure = Figure::from(of_trace(&found, String::new()));
     let report = Report {
         input: args.trace.clone(),
         output: out.clone(),
@@ -124,7 +126,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         extra_edges: found.extra,
     };
     write_readings(out, existing, &found.readings, &provenance)?;
-    write_result(&report.picture, existing, &drawn)?;
+    figure.write_files(&report.picture, existing, args.figure.figure, &provenance)?;
     args.report.print(&report, &provenance, |report| {
         report.words.iter().try_for_each(print::line)?;
         report.warnings.iter().for_each(print::warning);

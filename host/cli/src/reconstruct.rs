@@ -8,7 +8,7 @@ use super::camera::parse_order;
 use super::method::MethodArgs;
 use super::progress::Progress;
 use super::provenance::made;
-use super::report::{ReportArgs, StageTimes, stages};
+use super::report::{FigureArgs, ReportArgs, StageTimes, stages};
 use super::source::SourceArgs;
 use super::{Usage, print};
 use anyhow::Result;
@@ -79,6 +79,8 @@ pub struct Args {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -107,18 +109,26 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let solver = args.method.solver(first, args.sampling)?;
     let (input, enhance, out) = (&*args.source.input, args.enhance, &*args.out);
     let made = made();
-    let request = OneImage { input, solver: &solver, enhance, out, made };
+    let figure = args.figure.figure;
+    let request = OneImage { input, solver: &solver, enhance, out, made, figure };
     let report = one_image(&request, source, times)?;
     args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
 }
 
 /// Reconstructs the measurements of a capture as one image, and enhances it if the networks take its size. The folder `out`
 /// gets the files of `reconstruct --enhance`.
-pub fn picture(source: Source, recording: &Path, out: &Path, json: bool) -> Result<()> {
+pub fn picture(
+    source: Source,
+    recording: &Path,
+    out: &Path,
+    figure: FigureArgs,
+    json: bool,
+) -> Result<()> {
     let solver = MethodArgs::default().solver(FirstPatterns::LowestSequencies, Sampling::ALL)?;
     let made = made();
     let enhance = Enhance::takes(source.measurements.side());
-    let request = OneImage { input: recording, solver: &solver, enhance, out, made };
+    let request =
+        OneImage { input: recording, solver: &solver, enhance, out, made, figure: figure.figure };
     let report = one_image(&request, source, stages())?;
     report.all_warnings().for_each(print::warning);
     let name = if enhance { "enhanced.png" } else { "image.png" };

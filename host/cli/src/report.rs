@@ -3,6 +3,7 @@
 use super::print;
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use nirspi::picture::FigureStyle;
 use nirspi::provenance::Provenance;
 pub use nirspi::stage_times::StageTimes;
 use serde::Serialize;
@@ -15,6 +16,15 @@ pub struct ReportArgs {
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// How figures are drawn.
+#[derive(Debug, Clone, Copy, Default, clap::Args)]
+pub struct FigureArgs {
+    /// What figures are made for: each is a PNG, an SVG and a PDF, and a chart's points a CSV
+    #[arg(long, value_name = "STYLE", default_value = FigureStyle::default().name(),
+          value_parser = words(&FigureStyle::ALL, |style| (style.name(), style.about())))]
+    pub figure: FigureStyle,
 }
 
 /// What happens to a file that has the name of a result.

@@ -12,7 +12,7 @@
 mod natural;
 
 use natural::Scenes;
-use nirspi::picture::{Axis, Chart, Line, Panel, Range, SideBySide, Unit, below, signed_png};
+use nirspi::picture::{Axis, Chart, Figure, FigureStyle, Line, Panel, Range, SideBySide, Unit};
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::completion::{Part, Row, Scene, compare, image, methods, quality};
 use nirspi_recon::reconstruct::Reconstruct;
@@ -174,8 +174,12 @@ fn natural_tables(data: &Path, out: &Path, methods: &Methods, most: usize) -> Re
             charts.push(chart(&title, name, of, &rows, methods, scenes.len()));
         }
     }
-    let pairs: Vec<_> = charts.chunks(2).map(nirspi::picture::beside).collect();
-    std::fs::write(out.join("prior_curves.png"), signed_png(&below(&pairs), &provenance()))?;
+    draw(&out.join("prior_curves.png"), &Figure::grid(2, charts))
+}
+
+/// Writes a figure.
+fn draw(path: &Path, figure: &Figure) -> Result<()> {
+    std::fs::write(path, figure.png(&FigureStyle::Paper.look(), &provenance()))?;
     Ok(())
 }
 
@@ -186,7 +190,7 @@ fn chart(
     rows: &[Row],
     methods: &Methods,
     count: usize,
-) -> image::RgbImage {
+) -> Chart {
     let lines = methods.iter().enumerate().map(|(colour, (word, _))| Line {
         name: (*word).to_owned(),
         colour,
@@ -197,14 +201,13 @@ fn chart(
             .map(|row| (row.share, of(row)))
             .collect(),
     });
-    let chart = Chart {
+    Chart {
         header: title.to_owned(),
         x: Axis::of("share of the patterns, zig-zag", vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5], false),
         y: Axis::around(name, rows.iter().map(of)),
         lines: lines.collect(),
         footer: format!("simulated readings of {count} photographs that training has not seen"),
-    };
-    chart.render_at((560, 380))
+    }
 }
 
 fn orders(data: &Path, methods: &Methods, most: usize) -> Result<()> {
@@ -339,7 +342,5 @@ fn pictures(data: &Path, out: &Path, methods: &Methods) -> Result<()> {
         let footer = "10 % of the patterns, zig-zag; simulated readings of a photograph".to_owned();
         shown.push(SideBySide { header, panels, footer });
     }
-    let rendered: Vec<_> = shown.iter().map(|row| row.render_at(192)).collect();
-    std::fs::write(out.join("prior_pictures.png"), signed_png(&below(&rendered), &provenance()))?;
-    Ok(())
+    draw(&out.join("prior_pictures.png"), &Figure::column(shown))
 }

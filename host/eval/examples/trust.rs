@@ -15,7 +15,7 @@ mod natural;
 use image::imageops::{self, FilterType};
 use image::{ImageBuffer, Luma};
 use natural::Scenes;
-use nirspi::picture::signed_png;
+use nirspi::picture::FigureStyle;
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::characters;
 use nirspi_eval::trust::{NATURAL, Report, Settings, calibrate, judge};
@@ -70,8 +70,9 @@ fn main() -> Result<()> {
             let intervals = Intervals::parse(&std::fs::read_to_string(&file)?)?;
             let judged = judge(&settings, &intervals, &progress)?;
             std::fs::create_dir_all(&out)?;
-            for (name, picture) in &judged.pictures {
-                std::fs::write(out.join(name), signed_png(picture, &provenance()))?;
+            for (name, figure) in &judged.pictures {
+                let picture = figure.png(&FigureStyle::Paper.look(), &provenance());
+                std::fs::write(out.join(format!("{name}.png")), picture)?;
             }
             std::fs::write(out.join("trust.json"), serde_json::to_string_pretty(&judged.report)?)?;
             say(&judged.report);

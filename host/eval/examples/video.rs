@@ -8,7 +8,7 @@
 //! `image.png` (a moving letter: scene and best single frames above, recursive estimates below).
 
 use nirspi::picture::{
-    Axis, Chart, Line, Panel, Pictures, Range, SideBySide, Unit, below, signed_png,
+    Axis, Chart, Figure, FigureStyle, Line, Panel, Pictures, Range, SideBySide, Unit,
 };
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::video::{Compared, Motion, VideoRow, compare};
@@ -44,7 +44,7 @@ fn main() -> Result<()> {
         let made = compare(motion, noise, frames, SEED)?;
         print(&made.rows);
         if SHOWN.contains(&motion) {
-            pictures.push(picture(&made, frames * 3 / 4).render());
+            pictures.push(picture(&made, frames * 3 / 4));
         }
         if motion == Motion::Letter(0.25) {
             animate(&out, &made)?;
@@ -52,11 +52,11 @@ fn main() -> Result<()> {
         all.extend(made.rows);
     }
     std::fs::write(out.join("video.json"), serde_json::to_string_pretty(&all)?)?;
-    std::fs::write(out.join("video.png"), signed_png(&below(&pictures), &provenance()))?;
-    std::fs::write(
-        out.join("video_curves.png"),
-        signed_png(&chart(&all, noise).render(), &provenance()),
-    )?;
+    let draw = |name: &str, figure: Figure| {
+        std::fs::write(out.join(name), figure.png(&FigureStyle::Paper.look(), &provenance()))
+    };
+    draw("video.png", Figure::column(pictures))?;
+    draw("video_curves.png", chart(&all, noise).into())?;
     Ok(())
 }
 
@@ -129,7 +129,14 @@ fn animate(out: &Path, made: &Compared) -> Result<()> {
     };
     let images: Vec<Image> = (0..made.truths.len()).map(frame).collect();
     let header = format!("{}: scene, frame by frame; recursive, in turn", made.rows[0].motion);
-    let pictures = Pictures::of_video(&header, &images, Unit::Reflectance, None, &provenance());
+    let pictures = Pictures::of_video(
+        &header,
+        &images,
+        Unit::Reflectance,
+        None,
+        FigureStyle::Paper,
+        &provenance(),
+    );
     let mut folder = nirspi::files::output::OutputDir::create(out)?;
     pictures.write(&mut folder)?;
     folder.commit()?;

@@ -136,6 +136,17 @@ fn along_m() -> impl Iterator<Item = f64> {
     (0..=160).map(|i| 0.2 * 10_f64.powf(f64::from(i) / 160.0))
 }
 
+/// The axis of charts against the distance of the target.
+pub(crate) fn distance_axis() -> Axis {
+    Axis {
+        name: "distance, m".to_owned(),
+        from: 0.2,
+        to: 2.0,
+        logarithmic: true,
+        ticks: vec![0.2, 0.3, 0.6, 1.0, 2.0],
+    }
+}
+
 /// A chart of a value against distance, with a line for each camera.
 fn chart(
     camera: &CameraModel,
@@ -159,7 +170,7 @@ fn chart(
     }
     Ok(Chart {
         header: header.to_owned(),
-        x: crate::range::distance_axis(),
+        x: distance_axis(),
         y,
         lines,
         footer: "simulated: photon budget and geometry, dry air, white sheet, all patterns"

@@ -27,8 +27,8 @@ pub(crate) use characters::groups;
 pub(crate) use condition::halved;
 
 use crate::error::Result;
-use image::RgbImage;
 use measure::Judges;
+use nirspi::picture::Figure;
 use nirspi_nets::{Device, Networks};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -111,12 +111,12 @@ pub struct Study {
     depth: depth::Tools,
 }
 
-/// The report, and its pictures by file name.
+/// The report, and its figures by name.
 pub struct Measured {
     /// The report.
     pub report: Report,
     /// Charts, and scenes other than characters.
-    pub pictures: Vec<(&'static str, RgbImage)>,
+    pub pictures: Vec<(&'static str, Figure)>,
 }
 
 impl Study {
@@ -175,9 +175,9 @@ impl Study {
         let steps = over(&self.stepped, &[MIDDLE], few, judges, seed, done)?;
         let shown = others::enhance(&self.scenes, &self.bridge)?;
         let mut pictures = charts::all(&measured, &steps, characters, few);
-        pictures.push(("others.png", shown.picture.render()));
+        pictures.push(("others", shown.picture.into()));
         let depth = depth::ablation(characters, &self.depth, seed, done)?;
-        pictures.push(("depth.png", depth.picture.render()));
+        pictures.push(("depth", depth.picture.into()));
         let report = Report {
             simulated: true,
             seed,

@@ -1,9 +1,9 @@
 //! The camera's range in rain by physics and by Algorithm 2 as printed, compared with the paper's
 //! Table 2.
 
+use crate::camera_model::{distance_axis, resolution_chart, snr_chart};
 use crate::error::{EvalError, Result};
-use image::RgbImage;
-use nirspi::picture::{Axis, Chart, Line, below};
+use nirspi::picture::{Axis, Chart, Figure, Line};
 use nirspi_optics::CameraModel;
 use nirspi_optics::camera::Instrument;
 use nirspi_optics::pixel::{PixelBudget, PixelError};
@@ -289,12 +289,19 @@ fn reading(
     Ok(lines)
 }
 
-/// The [`charts`] in one picture.
+/// The figures and their names: `range` (the [`charts`]), `exposure`, and `resolution` and `snr` of
+/// this camera beside the shipped ones.
 ///
 /// # Errors
-/// Does not occur: the air is the paper's.
-pub fn picture(settings: &Settings) -> Result<RgbImage> {
-    Ok(below(&charts(settings)?.map(|chart| chart.render())))
+/// [`EvalError::is_setting`] for a reflectance out of range.
+pub fn figures(settings: &Settings) -> Result<[(&'static str, Figure); 4]> {
+    let camera = &settings.camera;
+    Ok([
+        ("range", Figure::column(charts(settings)?)),
+        ("exposure", exposure_chart(settings)?.into()),
+        ("resolution", resolution_chart(camera)?.into()),
+        ("snr", snr_chart(camera)?.into()),
+    ])
 }
 
 /// Distances of the lines, in m: 0.1 to 10.
@@ -347,7 +354,7 @@ pub fn charts(settings: &Settings) -> Result<[Chart; 2]> {
             Some((m, 100.0 * (1.0 - snr(weather, m, longest).ok()? / dry)))
         };
         let points = distances_m().filter_map(lost).collect();
-        lines.push(Line { name, colour: 3 + lines.len(), dashed: false, points });
+        lines.push(Line { name, colour: lines.len(), dashed: false, points });
     }
     let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
     let lost = Chart {
@@ -390,17 +397,6 @@ pub fn exposure_chart(settings: &Settings) -> Result<Chart> {
         points: PAPER_EXPOSURES.to_vec(),
     });
     Ok(exposures_against_distance(lines))
-}
-
-/// The axis of charts against the distance of the target.
-pub(crate) fn distance_axis() -> Axis {
-    Axis {
-        name: "distance, m".to_owned(),
-        from: 0.2,
-        to: 2.0,
-        logarithmic: true,
-        ticks: vec![0.2, 0.3, 0.6, 1.0, 2.0],
-    }
 }
 
 fn exposures_against_distance(lines: Vec<Line>) -> Chart {

@@ -10,7 +10,7 @@ mod plot;
 mod tables;
 
 use crate::error::{EvalError, Result};
-use image::RgbImage;
+use nirspi::picture::Figure;
 use nirspi_recon::reconstruct::{
     self, Method, MethodSettings, Reconstruct, ReconstructError, Setting, Sparsity,
 };
@@ -304,14 +304,18 @@ impl Study {
         tables::all(report, &self.order_names(), &self.method_names(), &self.shares)
     }
 
-    /// The best images; and for each order the gain over zero filling of the best methods against
-    /// the share, with their images. An order that repeats another is left out.
+    /// The figures and their names: `sampling`, the best image at each share, and for each order the
+    /// gain over zero filling of the best methods against the share; `sampling_images`, the images of
+    /// the best methods of each order. An order that repeats another is left out.
     #[must_use]
-    pub fn plot(&self, report: &Report) -> RgbImage {
+    pub fn figures(&self, report: &Report) -> Vec<(&'static str, Figure)> {
         let methods = self.method_names();
         let (orders, _) =
             tables::telling_orders(report, &self.order_names(), &methods, &self.shares);
-        plot::draw(report, &orders, &methods)
+        let mut figures = vec![("sampling", plot::curves(report, &orders, &methods))];
+        figures
+            .extend(plot::best_images(report, &orders).map(|images| ("sampling_images", images)));
+        figures
     }
 
     fn order_names(&self) -> Vec<String> {
@@ -448,8 +452,10 @@ mod tests {
                 shown.sampling
             );
         }
-        let drawn = study.plot(&report);
-        assert!(drawn.width() > 800 && drawn.height() > 1000, "{:?}", drawn.dimensions());
+        let figures = study.figures(&report);
+        let names: Vec<&str> = figures.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, ["sampling", "sampling_images"]);
+        assert_eq!(figures[0].1.charts().len(), 2);
     }
 
     #[test]
@@ -469,6 +475,8 @@ mod tests {
             }
         }
         let charts = plot::charts(&report, &orders, &methods);
+        // Orders are compared on one axis.
+        assert!(charts.iter().all(|chart| chart.y == charts[0].y && chart.x == charts[0].x));
         let mut looks = std::collections::BTreeMap::new();
         for chart in &charts {
             assert_eq!(crate::looks(chart), chart.lines.len());

@@ -17,9 +17,8 @@ use crate::pictures::{Enhancers, Picture};
 use crate::quality::halved;
 use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
 use crate::typefaces::{self, CHARACTERS, of_scene};
-use image::RgbImage;
 use nirspi::imaging::{Fit, score, share_of_white};
-use nirspi::picture::{Panel, Range, SideBySide, Typeface, Unit, stacked};
+use nirspi::picture::{Figure, Panel, Range, SideBySide, Typeface, Unit};
 use nirspi::scene::SceneMap;
 use nirspi_nets::images::Images;
 use nirspi_nets::metrics::{CharacterJudge, Judged as Features};
@@ -192,10 +191,10 @@ impl Table {
     ///
     /// # Errors
     /// `EvalError` for a capture that fails.
-    pub fn picture(&self) -> Result<RgbImage> {
+    pub fn picture(&self) -> Result<Figure> {
         let of = |distance_m| self.panels(distance_m);
         let rows: Vec<SideBySide> = DISTANCES_M.into_iter().map(of).collect::<Result<_>>()?;
-        Ok(stacked(&rows))
+        Ok(Figure::column(rows))
     }
 
     fn panels(&self, distance_m: f64) -> Result<SideBySide> {

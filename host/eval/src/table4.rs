@@ -339,7 +339,8 @@ pub fn chart(report: &Report) -> Chart {
     let lines = report.rows.iter().enumerate().map(|(k, row)| Line {
         name: format!("{}, {} m", row.image.name(), row.distance_m),
         colour: k,
-        dashed: false,
+        // Ten lines differ; the others are the same, dashed.
+        dashed: k >= Line::LOOKS,
         points: row.bar_contrast.iter().map(|&(mm, contrast)| (mm, contrast.max(0.0))).collect(),
     });
     Chart {

@@ -23,7 +23,7 @@ pub use letters::Letters;
 
 use crate::error::{EvalError, Result};
 use crate::quality::{Characters, Origin};
-use image::RgbImage;
+use nirspi::picture::Figure;
 use nirspi_nets::data::Stack;
 use nirspi_nets::interval::{Intervals, NETWORKS};
 use nirspi_nets::metrics::CharacterJudge;
@@ -167,12 +167,12 @@ pub struct Report {
     pub letters: Vec<Letters>,
 }
 
-/// The report, and its pictures by file name.
+/// The report, and its figures by name.
 pub struct Judged {
     /// The report.
     pub report: Report,
     /// The coverage curve, and cases with failures among them.
-    pub pictures: Vec<(&'static str, RgbImage)>,
+    pub pictures: Vec<(&'static str, Figure)>,
 }
 
 /// Judges intervals and readings on the images that the calibration has not used. `done` is called
@@ -196,7 +196,7 @@ pub fn judge(settings: &Settings, intervals: &Intervals, done: &dyn Fn(usize)) -
     let read = letters::judged(&intervals.calibration().characters, &cases);
     let shown = charts::cases(intervals, &studio, &shots)?;
     let pictures =
-        vec![("coverage.png", charts::curve(&coverage)), ("intervals.png", charts::picture(shown))];
+        vec![("coverage", charts::curve(&coverage)), ("intervals", charts::picture(shown))];
     let images = images.origins().to_vec();
     let report = Report { simulated: true, seed: settings.seed, images, coverage, letters: read };
     Ok(Judged { report, pictures })

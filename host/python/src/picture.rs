@@ -4,7 +4,7 @@ use crate::arrays::{slice, whole};
 use crate::errors::refused;
 use crate::made::made;
 use crate::work::heavy;
-use nirspi::picture::{Panel, Sheet, SideBySide, Unit};
+use nirspi::picture::{Figure, FigureStyle, Panel, Sheet, Unit};
 use nirspi::provenance::{Origin, Taken};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
@@ -45,7 +45,8 @@ pub fn picture<'py>(
         warnings,
         ..Panel::square(title, 1, values, unit(unit_name)?)
     };
-    let png = heavy(py, || Ok(SideBySide::from(panel).png(&provenance)))?;
+    let look = FigureStyle::Paper.on_screen();
+    let png = heavy(py, || Ok(Figure::Images(panel.into()).png(&look, &provenance)))?;
     Ok(PyBytes::new(py, &png))
 }
 
@@ -63,7 +64,8 @@ pub fn sheet<'py>(
     let unit = unit(unit_name)?;
     let provenance = Taken::without_camera(Origin::Unknown).made(&made(py)?);
     let png = heavy(py, || {
-        Ok(Sheet::new(header, n, values.chunks_exact(n * n).collect(), unit).png(&provenance))
+        let sheet = Sheet::new(header, n, values.chunks_exact(n * n).collect(), unit);
+        Ok(sheet.png(&FigureStyle::Paper.on_screen(), &provenance))
     })?;
     Ok(PyBytes::new(py, &png))
 }

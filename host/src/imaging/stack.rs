@@ -11,7 +11,7 @@ use crate::files::image::{
 };
 use crate::files::npy;
 use crate::files::output::{Existing, OutputDir, write_result};
-use crate::picture::{Panel, Pictures, Sheet, SideBySide, Unit};
+use crate::picture::{FigureStyle, Panel, Pictures, Sheet, SideBySide, Unit};
 use crate::provenance::{Provenance, Taken};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -230,7 +230,8 @@ impl ImageStack {
             false => Shown::Many,
         };
         let (path, source) = (out.to_owned(), self.path.clone());
-        let target = StackTarget { path, kind, input, source, overwrite };
+        let target =
+            StackTarget { path, kind, input, source, overwrite, figure: FigureStyle::Paper };
         match &target.kind {
             Kind::Folder(names) => {
                 OutputDir::create(out)?.check(names.iter().map(String::as_str))?;
@@ -250,6 +251,8 @@ pub struct StackTarget {
     /// Where the images are that the results are made of.
     source: PathBuf,
     overwrite: bool,
+    /// What the picture beside the results is made for.
+    figure: FigureStyle,
 }
 
 /// What a picture shows beside the results: the image itself, if there is one.
@@ -270,6 +273,12 @@ enum Kind {
 impl StackTarget {
     fn existing(&self) -> Existing<'_> {
         Existing::of(self.overwrite, Some(&self.source))
+    }
+
+    /// The same target, with a picture beside it that is made for something else.
+    #[must_use]
+    pub fn with_figure(self, figure: FigureStyle) -> Self {
+        Self { figure, ..self }
     }
 
     /// Writes images of `side` x `side` with values in [0, 1].
@@ -311,16 +320,18 @@ impl StackTarget {
         };
         let name = name.map_or_else(|| "images".into(), |name| name.to_string_lossy());
         let file = self.path.with_file_name(format!("{name}{FOR_PEOPLE}"));
-        let mut pictures = Pictures::new(provenance);
+        let mut pictures = Pictures::new(self.figure, provenance);
         let named = file.display().to_string();
-        self.existing().check(&file)?;
+        for ending in ["png", "svg", "pdf"] {
+            self.existing().check(&file.with_extension(ending))?;
+        }
         self.write(side, values, provenance)?;
         match &self.input {
             Shown::Single(input) => {
                 let result = Panel::square(title, side, values, Unit::OfWhite);
                 let panels = vec![input.clone(), result];
                 let (header, footer) = (String::new(), String::new());
-                pictures.add(&named, &SideBySide { header, panels, footer });
+                pictures.add(&named, SideBySide { header, panels, footer });
             }
             Shown::Many => {
                 let images = values.chunks_exact(side * side).collect();

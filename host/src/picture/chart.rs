@@ -3,41 +3,25 @@
 //! # Invariant
 //! Every point lies where its axes say (`tests::a_point_lies_where_its_axes_say`), clipped to the
 //! frame (`tests::points_outside_the_frame_or_nowhere_are_left_out`). Every line is named in the
-//! legend beside the frame, where it covers no line, and no two [`looks`](Line::look) are alike
+//! legend below the frame, where it covers no line, and no two [`looks`](Line::look) are alike
 //! (`tests::no_two_looks_are_alike`). Labels of ticks do not touch
 //! (`tests::labels_that_would_touch_are_left_out`).
 
-use super::text::{Block, Font, Style};
+use super::bar::draw_ticks;
+use super::drawing::{Drawing, Shape};
+use super::look::{CURVE_COLOURS, Colour, Look};
+use super::signature::MARGIN;
+use super::text::{Block, Style};
 use super::ticks::{around, label};
-use super::{BRIGHT, DIM, GRID, GROUND};
-use image::{Rgb, RgbImage};
 
-/// The frame of a chart: columns and rows.
-const FRAME_PX: (u32, u32) = (950, 500);
-const LEFT_PX: u32 = 110;
-const MARGIN_PX: u32 = 24;
-/// Room for a piece of the line before its name in the legend.
-const LEGEND_LINE_PX: u32 = 50;
-/// The widest name in a legend. A longer one has several lines.
-const LEGEND_PX: u32 = 330;
 /// A line of up to this many points shows each point.
 const POINTS_MARKED: usize = 24;
+/// Room for a piece of the line before its name in the legend, in sixteenths of the text's size.
+const LEGEND_LINE: u32 = 44;
 
-/// Colours of the lines, chosen to differ for people who confuse red and green (Okabe and Ito, on a
-/// dark ground).
-const COLOURS: [Rgb<u8>; 8] = [
-    Rgb([86, 180, 233]),
-    Rgb([230, 159, 0]),
-    Rgb([0, 158, 115]),
-    Rgb([204, 121, 167]),
-    Rgb([240, 228, 66]),
-    Rgb([213, 94, 0]),
-    Rgb([236, 238, 242]),
-    Rgb([118, 130, 255]),
-];
-
-/// Lengths drawn and left out along a line, in turn; solid without any.
-const DASHES_PX: [&[f64]; 4] = [&[], &[10.0, 7.0], &[2.5, 6.0], &[14.0, 5.0, 2.5, 5.0]];
+/// Lengths drawn and left out along a line, in turn, in sixteenths of the text's size; solid without
+/// any.
+pub(super) const DASHES: [&[u32]; 4] = [&[], &[9, 6], &[16, 5, 3, 5], &[2, 5]];
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,7 +88,8 @@ impl Axis {
 pub struct Line {
     /// The name in the legend.
     pub name: String,
-    /// Which of the eight colours. Beyond them the colours come again with dots.
+    /// Which of ten looks: five colours, then the same with other dashes, each with its own shape of
+    /// points.
     pub colour: usize,
     /// Whether the line is dashed.
     pub dashed: bool,
@@ -113,19 +98,55 @@ pub struct Line {
 }
 
 impl Line {
+    /// Number of lines without `dashed` that differ in colour or dashes.
+    pub const LOOKS: usize = 2 * CURVE_COLOURS;
+
     /// Colour and dashes as indices: equal for two lines that look alike.
     #[must_use]
     pub fn look(&self) -> (usize, usize) {
-        let again = self.colour / COLOURS.len() % 2;
-        (self.colour % COLOURS.len(), 2 * again + usize::from(self.dashed))
+        let again = self.colour / CURVE_COLOURS % 2;
+        (self.colour % CURVE_COLOURS, 2 * again + usize::from(self.dashed))
     }
 
-    fn colour(&self) -> Rgb<u8> {
-        COLOURS[self.look().0]
+    fn colour(&self, look: &Look) -> Colour {
+        look.palette.curves[self.look().0]
     }
 
-    fn dashes(&self) -> &'static [f64] {
-        DASHES_PX[self.look().1]
+    fn dashes(&self, look: &Look) -> Vec<f64> {
+        DASHES[self.look().1].iter().map(|&length| f64::from(look.px(length))).collect()
+    }
+}
+
+/// The shape of a line's points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Point(usize);
+
+impl Point {
+    pub(super) fn of(line: &Line) -> Self {
+        Self(line.colour % Line::LOOKS)
+    }
+
+    /// The corners of a point of about this radius.
+    fn corners(self, (x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
+        // Angle of the first corner in degrees, clockwise from the right; the distances of corners in turn.
+        let (count, first, distances): (u32, f64, &[f64]) = match self.0 {
+            0 => (16, 0.0, &[1.0]),
+            1 => (4, 45.0, &[1.2]),
+            2 => (3, -90.0, &[1.35]),
+            3 => (4, 0.0, &[1.3]),
+            4 => (3, 90.0, &[1.35]),
+            5 => (10, -90.0, &[1.5, 0.6]),
+            6 => (3, 0.0, &[1.35]),
+            7 => (8, 45.0, &[1.5, 0.45]),
+            8 => (8, 0.0, &[1.5, 0.45]),
+            _ => (3, 180.0, &[1.35]),
+        };
+        let corner = |k: u32| {
+            let angle = (first + 360.0 * f64::from(k) / f64::from(count)).to_radians();
+            let far = radius * distances[k as usize % distances.len()];
+            (x + far * angle.cos(), y + far * angle.sin())
+        };
+        (0..count).map(corner).collect()
     }
 }
 
@@ -144,18 +165,18 @@ pub struct Chart {
     pub footer: String,
 }
 
-const TITLE: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 28.0, line_px: 34, colour: BRIGHT };
-const SMALL: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 18.0, line_px: 22, colour: DIM };
+/// What of a chart stands below its frame; neighbours may say the same.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Below {
+    pub(super) legend: bool,
+    pub(super) footer: bool,
+}
 
 /// Where everything of a chart is, in pixels.
 struct Laid {
     header: Block,
     y_name: Block,
     x_name: Block,
-    footer: Block,
-    names: Vec<Block>,
     /// The frame: left and right, top and bottom.
     x_px: (f64, f64),
     y_px: (f64, f64),
@@ -163,194 +184,194 @@ struct Laid {
 }
 
 impl Chart {
-    /// Draws the chart; [`signed_png`](super::signed_png) makes a PNG of it.
-    #[must_use]
-    pub fn render(&self) -> RgbImage {
-        self.render_at(FRAME_PX)
+    /// The names of the lines and their looks: what the legend says.
+    pub(super) fn legend_of(&self) -> Vec<(&str, (usize, usize))> {
+        self.lines.iter().map(|line| (line.name.as_str(), line.look())).collect()
     }
 
-    /// As [`render`](Self::render), with a frame of so many columns and rows.
-    #[must_use]
-    pub fn render_at(&self, frame_px: (u32, u32)) -> RgbImage {
-        let laid = self.lay(frame_px);
-        let mut canvas = RgbImage::from_pixel(laid.size.0, laid.size.1, GROUND);
+    /// Draws the chart in this width.
+    pub(super) fn draw(&self, look: &Look, width: u32, below: Below) -> Drawing {
+        let legend = below.legend.then(|| self.legend(look, width));
+        let legend_px = legend.as_ref().map_or(0, |legend| legend.size().1);
+        let source = below.footer.then(|| self.source(look, width));
+        let source_px = source.as_ref().map_or(0, |source| source.size().1);
+        let laid = self.lay(look, width, legend_px + source_px);
+        let margin = look.px(MARGIN);
+        let mut canvas = Drawing::new(look, laid.size.0, laid.size.1);
         let ((left, right), (top, bottom)) = (laid.x_px, laid.y_px);
         let x_px = |x: f64| left + self.x.at(x) * (right - left);
         let y_px = |y: f64| bottom - self.y.at(y) * (bottom - top);
+        let plain = Style::plain(look);
+        let thin = f64::from(look.px(1));
 
-        laid.header.draw(&mut canvas, LEFT_PX, MARGIN_PX);
-        laid.y_name.draw(&mut canvas, LEFT_PX, top as u32 - laid.y_name.height() - 8);
-        let small = SMALL();
-        let mut free_from = 0.0;
+        laid.header.draw(&mut canvas, margin, margin);
+        laid.y_name.draw(&mut canvas, margin, top as u32 - laid.y_name.height() - look.px(10));
         for &tick in &self.x.ticks {
-            stroke(&mut canvas, (x_px(tick), top), (x_px(tick), bottom), GRID, 1.0);
-            let text = label(tick);
-            let wide = small.width(&text);
-            let at = x_px(tick) as f32 - wide / 2.0;
-            if at >= free_from {
-                small.draw(&mut canvas, &text, at, bottom as f32 + 6.0);
-                free_from = at + wide + 8.0;
-            }
+            let ends = [(x_px(tick), top), (x_px(tick), bottom)];
+            canvas.line(ends, thin, look.palette.grid);
         }
         let mut free_to = f64::INFINITY;
         for &tick in &self.y.ticks {
-            stroke(&mut canvas, (left, y_px(tick)), (right, y_px(tick)), GRID, 1.0);
+            let ends = [(left, y_px(tick)), (right, y_px(tick))];
+            canvas.line(ends, thin, look.palette.grid);
             let text = label(tick);
             if y_px(tick) <= free_to {
-                let at = LEFT_PX as f32 - small.width(&text) - 10.0;
-                small.draw(&mut canvas, &text, at.max(0.0), y_px(tick) as f32 - 11.0);
-                free_to = y_px(tick) - 20.0;
+                let at = left as f32 - plain.width(&text) - look.px(6) as f32;
+                let high = plain.line_px as f32;
+                plain.draw(&mut canvas, &text, at, y_px(tick) as f32 - high / 2.0);
+                free_to = y_px(tick) - f64::from(high);
             }
         }
-        let x_left = right - f64::from(laid.x_name.width());
-        laid.x_name.draw(&mut canvas, x_left as u32, bottom as u32 + 32);
-        let footer_top = laid.size.1 - MARGIN_PX - laid.footer.height();
-        laid.footer.draw(&mut canvas, LEFT_PX, footer_top);
-
-        for line in &self.lines {
-            self.draw(&mut canvas, line, x_px, y_px);
+        for ends in [[(left, top), (left, bottom)], [(left, bottom), (right, bottom)]] {
+            canvas.line(ends, thin, look.palette.frame);
         }
-        self.legend(&mut canvas, &laid);
+        let ticks: Vec<(f64, String)> =
+            self.x.ticks.iter().map(|&tick| (x_px(tick), label(tick))).collect();
+        draw_ticks(&mut canvas, look, &ticks, bottom as u32, (margin, width - margin));
+        for line in &self.lines {
+            self.draw_line(&mut canvas, look, line, x_px, y_px);
+        }
+        let x_left = right - f64::from(laid.x_name.width());
+        let name_top = bottom as u32 + look.px(6) + plain.line_px;
+        laid.x_name.draw(&mut canvas, (x_left as u32).max(margin), name_top);
+        let legend_top = name_top + laid.x_name.height_and(look.px(8));
+        if let Some(legend) = legend {
+            canvas.place(legend, 0, legend_top);
+        }
+        if let Some(source) = source {
+            canvas.place(source, 0, legend_top + legend_px);
+        }
         canvas
     }
 
-    fn lay(&self, (wide, high): (u32, u32)) -> Laid {
-        let names: Vec<Block> = self
-            .lines
-            .iter()
-            .map(|line| Block::new(SMALL, [line.name.as_str()], LEGEND_PX))
-            .collect();
-        let widest = names.iter().map(Block::width).fold(0.0, f32::max).ceil() as u32;
-        let legend_px = if names.is_empty() { 0 } else { LEGEND_LINE_PX + widest + MARGIN_PX };
-        let header = Block::new(TITLE, [self.header.as_str()], wide + legend_px);
-        let footer = Block::new(SMALL, [self.footer.as_str()], wide + legend_px);
-        let y_name = Block::new(SMALL, [self.y.name.as_str()], wide);
-        let x_name = Block::new(SMALL, [self.x.name.as_str()], wide);
-        let top = MARGIN_PX + header.height() + 8 + y_name.height() + 8;
-        let legend_bottom = top + 10 + names.iter().map(|name| name.height() + 2).sum::<u32>();
-        let below = (top + high + 32 + x_name.height()).max(legend_bottom);
-        let height = below + footer.height() + 16 + MARGIN_PX;
+    fn lay(&self, look: &Look, width: u32, below_px: u32) -> Laid {
+        let margin = look.px(MARGIN);
+        let inner = width - 2 * margin;
+        let plain = Style::plain(look);
+        let widest = self.y.ticks.iter().map(|&tick| plain.width(&label(tick))).fold(0.0, f32::max);
+        let left = margin + widest.ceil() as u32 + look.px(6);
+        // The last tick's label extends beyond the frame.
+        let right = width - margin - look.px(8);
+        let header = Block::new(Style::title(look), [self.header.as_str()], inner);
+        let y_name = Block::new(plain, [self.y.name.as_str()], inner);
+        let x_name = Block::new(plain, [self.x.name.as_str()], right - left);
+        let top = margin + header.height_and(look.px(6)) + y_name.height() + look.px(10);
+        // Wide charts are flatter.
+        let high = look.px(160) + (right - left) * 28 / 100;
+        let bottom = top + high;
+        let names = look.px(6) + plain.line_px + x_name.height_and(look.px(8));
+        let height = bottom + names + below_px + look.px(4);
         Laid {
-            x_px: (f64::from(LEFT_PX), f64::from(LEFT_PX + wide)),
-            y_px: (f64::from(top), f64::from(top + high)),
-            size: (LEFT_PX + wide + MARGIN_PX + legend_px, height),
+            x_px: (f64::from(left), f64::from(right)),
+            y_px: (f64::from(top), f64::from(bottom)),
+            size: (width, height),
             header,
             y_name,
             x_name,
-            footer,
-            names,
         }
     }
 
-    fn draw(
+    fn draw_line(
         &self,
-        canvas: &mut RgbImage,
+        canvas: &mut Drawing,
+        look: &Look,
         line: &Line,
         x_px: impl Fn(f64) -> f64,
         y_px: impl Fn(f64) -> f64,
     ) {
-        let colour = line.colour();
         let inside = |at: f64| (0.0..=1.0).contains(&at);
         let seen = |&(x, y): &(f64, f64)| inside(self.x.at(x)) && inside(self.y.at(y));
-        // Dashes continue from one piece to the next.
-        let mut along = 0.0;
-        for pair in line.points.windows(2) {
-            if pair.iter().all(seen) {
-                let [from, to] = [pair[0], pair[1]].map(|(x, y)| (x_px(x), y_px(y)));
-                along = dashes(canvas, (from, to), colour, line.dashes(), along);
-            }
+        for piece in line.points.split(|point| !seen(point)).filter(|piece| piece.len() > 1) {
+            let points = piece.iter().map(|&(x, y)| (x_px(x), y_px(y))).collect();
+            canvas.shapes.push(curve(look, line, points));
         }
         if line.points.len() <= POINTS_MARKED {
             for &(x, y) in line.points.iter().filter(|point| seen(point)) {
-                let at = (x_px(x), y_px(y));
-                stroke(canvas, at, at, colour, 8.0);
+                canvas.shapes.push(mark(look, line, (x_px(x), y_px(y))));
             }
         }
     }
 
-    /// Draws the legend right of the frame.
-    fn legend(&self, canvas: &mut RgbImage, laid: &Laid) {
-        let left = laid.x_px.1 + f64::from(MARGIN_PX);
-        let mut top = laid.y_px.0 + 10.0;
-        for (line, name) in self.lines.iter().zip(&laid.names) {
-            let ends = ((left, top + 11.0), (left + 38.0, top + 11.0));
-            dashes(canvas, ends, line.colour(), line.dashes(), 0.0);
-            name.draw(canvas, left as u32 + LEGEND_LINE_PX, top as u32);
-            top += f64::from(name.height() + 2);
+    /// The text below the chart.
+    pub(super) fn source(&self, look: &Look, width: u32) -> Drawing {
+        let margin = look.px(MARGIN);
+        let text = Block::new(Style::faint(look), [self.footer.as_str()], width - 2 * margin);
+        let mut canvas = Drawing::new(look, width, text.height_and(look.px(6)));
+        text.draw(&mut canvas, margin, 0);
+        canvas
+    }
+
+    /// The legend: columns of lines and their names.
+    pub(super) fn legend(&self, look: &Look, width: u32) -> Drawing {
+        let (margin, before, gap) = (look.px(MARGIN), look.px(LEGEND_LINE), look.px(16));
+        let inner = width - 2 * margin;
+        let plain = Style::plain(look);
+        let names: Vec<Block> = self
+            .lines
+            .iter()
+            .map(|line| Block::new(plain, [line.name.as_str()], inner - before))
+            .collect();
+        let widest = names.iter().map(Block::width).fold(0.0, f32::max).ceil() as u32;
+        let column = before + widest + gap;
+        let columns = ((inner + gap) / column).max(1) as usize;
+        let rows = names.len().div_ceil(columns).max(1);
+        let high = |row: usize| {
+            let of_row = names.iter().enumerate().filter(|(k, _)| k % rows == row);
+            of_row.map(|(_, name)| name.height()).max().unwrap_or(0)
+        };
+        let tops: Vec<u32> = (0..rows)
+            .scan(0, |top, row| {
+                let at = *top;
+                *top += high(row);
+                Some(at)
+            })
+            .collect();
+        let height = (0..rows).map(high).sum::<u32>();
+        let below = if names.is_empty() { 0 } else { look.px(6) };
+        let mut canvas = Drawing::new(look, width, height + below);
+        for (k, (line, name)) in self.lines.iter().zip(&names).enumerate() {
+            // Down each column in turn.
+            let left = margin + (k / rows) as u32 * column;
+            let top = tops[k % rows];
+            let middle = f64::from(top + plain.line_px / 2);
+            let ends = [f64::from(left), f64::from(left + before - look.px(8))];
+            canvas.shapes.push(curve(look, line, ends.map(|x| (x, middle)).to_vec()));
+            if line.points.len() <= POINTS_MARKED {
+                canvas.shapes.push(mark(look, line, ((ends[0] + ends[1]) / 2.0, middle)));
+            }
+            name.draw(&mut canvas, left + before, top);
         }
+        canvas
     }
 }
 
-/// Draws a line with this pattern of dashes; solid without any. `along` is the position in the
-/// pattern at the start; the result is the position at the end.
-fn dashes(
-    canvas: &mut RgbImage,
-    (from, to): ((f64, f64), (f64, f64)),
-    colour: Rgb<u8>,
-    pattern: &[f64],
-    along: f64,
-) -> f64 {
-    const WIDTH_PX: f64 = 2.5;
-    if pattern.is_empty() {
-        stroke(canvas, from, to, colour, WIDTH_PX);
-        return 0.0;
-    }
-    let length = (to.0 - from.0).hypot(to.1 - from.1);
-    let at = |px: f64| {
-        let part = px.clamp(0.0, length) / length;
-        (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1))
-    };
-    let period: f64 = pattern.iter().sum();
-    let mut start = -along;
-    while start < length && length > 0.0 {
-        let mut dash = start;
-        for pair in pattern.chunks(2) {
-            if dash + pair[0] > 0.0 && dash < length {
-                stroke(canvas, at(dash), at(dash + pair[0]), colour, WIDTH_PX);
-            }
-            dash += pair.iter().sum::<f64>();
-        }
-        start += period;
-    }
-    (along + length) % period
+/// A line through these places.
+fn curve(look: &Look, line: &Line, points: Vec<(f64, f64)>) -> Shape {
+    let (dashes, colour) = (line.dashes(look), line.colour(look));
+    Shape::Line { points, width: look.em() / 9.0, dashes, colour }
 }
 
-/// Draws a straight line of some width. Parts outside the canvas are cut.
-fn stroke(canvas: &mut RgbImage, from: (f64, f64), to: (f64, f64), colour: Rgb<u8>, width_px: f64) {
-    let length = (to.0 - from.0).hypot(to.1 - from.1);
-    if !length.is_finite() || length > 1e5 {
-        return;
-    }
-    let half = width_px / 2.0;
-    let (x0, x1) = (from.0.min(to.0) - half - 1.0, from.0.max(to.0) + half + 1.0);
-    let (y0, y1) = (from.1.min(to.1) - half - 1.0, from.1.max(to.1) + half + 1.0);
-    let bounded = |v: f64, limit: u32| v.clamp(0.0, f64::from(limit)) as u32;
-    for y in bounded(y0, canvas.height())..bounded(y1.ceil(), canvas.height()) {
-        for x in bounded(x0, canvas.width())..bounded(x1.ceil(), canvas.width()) {
-            let (px, py) = (f64::from(x) + 0.5 - from.0, f64::from(y) + 0.5 - from.1);
-            let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-            let along = if length > 0.0 {
-                ((px * dx + py * dy) / (length * length)).clamp(0.0, 1.0)
-            } else {
-                0.0
-            };
-            let off = (px - along * dx).hypot(py - along * dy);
-            let cover = (half + 0.5 - off).clamp(0.0, 1.0);
-            if cover > 0.0 {
-                let pixel = canvas.get_pixel_mut(x, y);
-                for (ground, ink) in pixel.0.iter_mut().zip(colour.0) {
-                    let mixed = f64::from(*ground) + (f64::from(ink) - f64::from(*ground)) * cover;
-                    *ground = mixed.round() as u8;
-                }
-            }
-        }
-    }
+/// A point of a line.
+fn mark(look: &Look, line: &Line, at: (f64, f64)) -> Shape {
+    let corners = Point::of(line).corners(at, look.em() / 4.5);
+    Shape::Area { corners, colour: line.colour(look) }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::look::FigureStyle;
     use super::*;
     use proptest::prelude::*;
+
+    const WHOLE: Below = Below { legend: true, footer: true };
+
+    fn look() -> Look {
+        FigureStyle::Column.look()
+    }
+
+    fn drawn(chart: &Chart) -> Drawing {
+        chart.draw(&look(), look().width(), WHOLE)
+    }
 
     fn chart(points: Vec<(f64, f64)>) -> Chart {
         let axis = |logarithmic| Axis {
@@ -370,20 +391,33 @@ mod tests {
         }
     }
 
-    /// The middle of the frame.
-    fn middle(chart: &Chart) -> (u32, u32) {
-        let laid = chart.lay(FRAME_PX);
-        let middle = |(from, to): (f64, f64)| ((from + to) / 2.0) as u32;
-        (middle(laid.x_px), middle(laid.y_px))
+    /// The curves of a drawing: lines in the colour of the first curve, without that of the legend.
+    fn curves(drawing: &Drawing) -> Vec<Vec<(f64, f64)>> {
+        let colour = look().palette.curves[0];
+        let mut found: Vec<_> = drawing
+            .shapes
+            .iter()
+            .filter_map(|shape| match shape {
+                Shape::Line { points, colour: of, .. } if *of == colour => Some(points.clone()),
+                _ => None,
+            })
+            .collect();
+        found.pop();
+        found
     }
 
     #[test]
     fn a_point_lies_where_its_axes_say() {
-        // A short line at x = 1, the middle of a logarithmic axis of 0.1 to 10, and y = 5.05, the
-        // middle of a linear one.
-        let chart = chart(vec![(0.99, 5.05), (1.01, 5.05)]);
-        let (x, y) = middle(&chart);
-        assert_eq!(*chart.render().get_pixel(x, y), COLOURS[0]);
+        // From x = 1, the middle of a logarithmic axis of 0.1 to 10, and y = 5.05, the middle of a linear one.
+        let chart = chart(vec![(1.0, 5.05), (10.0, 10.0)]);
+        let laid = chart.lay(&look(), look().width(), 0);
+        let ((left, right), (top, bottom)) = (laid.x_px, laid.y_px);
+        let found = curves(&drawn(&chart));
+        assert_eq!(found.len(), 1);
+        let expected = [((left + right) / 2.0, (top + bottom) / 2.0), (right, top)];
+        for (found, expected) in found[0].iter().zip(expected) {
+            assert!((found.0 - expected.0).abs() < 1e-6 && (found.1 - expected.1).abs() < 1e-6);
+        }
     }
 
     #[test]
@@ -392,16 +426,8 @@ mod tests {
             let (name, points) = (String::new(), Vec::new());
             Line { name, colour: k / 2, dashed: k % 2 == 1, points }.look()
         };
-        let looks: std::collections::BTreeSet<_> = (0..32).map(look).collect();
-        assert_eq!(looks.len(), 32);
-        let distance = |a: Rgb<u8>, b: Rgb<u8>| {
-            let square = |(a, b): (u8, u8)| (f64::from(a) - f64::from(b)).powi(2);
-            a.0.into_iter().zip(b.0).map(square).sum::<f64>().sqrt()
-        };
-        for (k, a) in COLOURS.iter().enumerate() {
-            assert!(distance(*a, GROUND) > 150.0, "{a:?} on the ground");
-            assert!(COLOURS[..k].iter().all(|b| distance(*a, *b) > 60.0), "{a:?}");
-        }
+        let looks: std::collections::BTreeSet<_> = (0..2 * Line::LOOKS).map(look).collect();
+        assert_eq!(looks.len(), 2 * Line::LOOKS);
     }
 
     #[test]
@@ -410,19 +436,22 @@ mod tests {
         crowded.lines.clear();
         crowded.x = Axis::of("x", (0..=200).map(f64::from).collect(), false);
         crowded.y = Axis::of("y", (0..=200).map(f64::from).collect(), false);
-        let canvas = crowded.render();
-        let laid = crowded.lay(FRAME_PX);
-        let blank = |x: u32, y: u32| *canvas.get_pixel(x, y) == GROUND;
-        // Between labels there are blank columns below the frame, and blank rows beside it.
-        let below = laid.y_px.1 as u32 + 6..laid.y_px.1 as u32 + 28;
-        let columns =
-            (LEFT_PX..laid.x_px.1 as u32).filter(|&x| below.clone().all(|y| blank(x, y))).count();
-        assert!(columns > 200, "{columns}");
-        let beside = LEFT_PX - 60..LEFT_PX - 8;
-        let rows = (laid.y_px.0 as u32..laid.y_px.1 as u32)
-            .filter(|&y| beside.clone().all(|x| blank(x, y)))
-            .count();
-        assert!(rows > 100, "{rows}");
+        let drawing = drawn(&crowded);
+        let mut places: Vec<(f64, f64, f64)> = Vec::new();
+        for shape in &drawing.shapes {
+            if let Shape::Text { x, baseline, size, text, .. } = shape {
+                let wide = f64::from(super::super::text::width(text, *size));
+                places.push((*x, x + wide, *baseline));
+            }
+        }
+        assert!(places.len() > 20, "{places:?}");
+        for (k, a) in places.iter().enumerate() {
+            for b in &places[..k] {
+                let line = f64::from(Style::plain(&look()).line_px);
+                let apart = a.1 < b.0 || b.1 < a.0 || (a.2 - b.2).abs() >= 0.9 * line;
+                assert!(apart, "{a:?} {b:?}");
+            }
+        }
     }
 
     #[test]
@@ -443,7 +472,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(12))]
+        #![proptest_config(ProptestConfig::with_cases(24))]
         #[test]
         fn text_of_any_length_stays_inside_the_chart(
             texts in prop::collection::vec("[ -~µ×−\n]{0,200}|[a-zW@]{60,160}", 4..16),
@@ -460,45 +489,23 @@ mod tests {
                     Line { name: name.clone(), colour, dashed: false, points: vec![] }
                 })
                 .collect();
-            let canvas = chart.render_at((420, 200));
-            let (width, height) = canvas.dimensions();
-            let lean = 3;
-            for (x, y, pixel) in canvas.enumerate_pixels() {
-                let edge = MARGIN_PX - lean;
-                let inside =
-                    (edge..width - edge).contains(&x) && (edge..height - edge).contains(&y);
-                prop_assert!(inside || *pixel == GROUND, "{} {} of {} x {}", x, y, width, height);
-            }
-        }
-    }
-
-    #[test]
-    fn a_dashed_line_is_drawn_in_part_whatever_its_points() {
-        let across: Vec<(f64, f64)> =
-            (0..=200).map(|i| (0.1 * 10_f64.powf(f64::from(i) / 100.0), 5.05)).collect();
-        let drawn = |dashed, points: &[(f64, f64)]| {
-            let mut chart = chart(points.to_vec());
-            chart.lines[0].dashed = dashed;
-            let (canvas, (_, y)) = (chart.render(), middle(&chart));
-            let right = chart.lay(FRAME_PX).x_px.1 as u32;
-            (LEFT_PX..right).filter(|&x| *canvas.get_pixel(x, y) == COLOURS[0]).count()
-        };
-        let whole = drawn(false, &across);
-        for points in [across.clone(), vec![across[0], across[200]]] {
-            let part = drawn(true, &points) as f64 / whole as f64;
-            assert!((0.5..0.75).contains(&part), "{part} of the line");
+            let drawing = drawn(&chart);
+            prop_assert!(drawing.beyond(look().px(MARGIN)).is_none(), "{:?}", drawing.beyond(look().px(MARGIN)));
+            prop_assert!(drawing.overlapping().is_none(), "{:?}", drawing.overlapping());
         }
     }
 
     #[test]
     fn points_outside_the_frame_or_nowhere_are_left_out() {
-        let nothing = chart(vec![]).render();
         for points in [
             vec![(100.0, 5.0), (200.0, 5.0)],
             vec![(1.0, f64::NAN), (1.1, f64::INFINITY)],
             vec![(-1.0, 5.0), (1.0, 50.0)],
         ] {
-            assert_eq!(chart(points).render(), nothing);
+            let drawing = drawn(&chart(points));
+            assert!(curves(&drawing).is_empty());
+            let areas = drawing.shapes.iter().filter(|s| matches!(s, Shape::Area { .. })).count();
+            assert_eq!(areas, 1, "the legend's alone");
         }
     }
 }

@@ -1,31 +1,30 @@
-//! A picture of panels in a row, with a header above and a footer below. Below each image is a grey
-//! bar with ticks in the image's unit, and the range of its values.
+//! A picture of panels in rows, with a header above and a footer below. Below each image are
+//! millimetres, where they are known, and a grey bar with ticks in the image's unit. Images of a row
+//! that share one scale have one bar.
 //!
 //! # Invariant
 //! The picture grows with its text
 //! (`tests::more_text_makes_a_taller_picture_and_less_a_lower_one`). No text is cut or overlaps
-//! (`tests::text_of_any_length_stays_inside_its_panel`). A square image has at least 256 pixels an
-//! edge (`tests::an_image_is_enlarged_by_a_whole_factor_to_256_pixels_at_least`).
+//! (`tests::text_of_any_length_stays_inside_its_panel`). A panel has room for a line of words
+//! (`tests::panels_have_as_many_rows_as_their_text_needs`). The image of a single panel is enlarged
+//! by a whole factor, so that programs can read it (`tests::a_single_image_has_whole_pixels`).
 
-use super::bar::{self, draw_bar};
+use super::bar::{self, draw_bar, draw_ticks};
+use super::drawing::{Drawing, Shape};
+use super::look::Look;
 use super::scale::{PERCENTILES, Range, Scale, Unit};
-use super::scale_bar::{self, draw_scale_bar};
-use super::signature::{FOOTER, signed};
-use super::text::{Block, Font, Style};
-use super::{AMBER, BRIGHT, FRAME, GROUND, MIDDLE};
-use crate::files::image::{Placed, encode_labelled, to_level};
-use crate::provenance::Provenance;
-use image::imageops::{self, FilterType};
-use image::{ImageBuffer, Luma, Rgb, RgbImage};
-use nirspi_recon::{Image, Shape};
+use super::signature::MARGIN;
+use super::text::{Block, Style};
+use super::ticks::{between, label};
+use crate::files::image::{Placed, to_level};
+use nirspi_recon::Image;
 
-/// Edge of a panel's image, unless a panel needs more: a multiple of the sides 32, 64 and 128, so
-/// that their pixels stay square.
-const PANEL_PX: u32 = 384;
-/// The least shorter edge of an image that is enlarged.
-pub(super) const LEAST_PX: u32 = 256;
-const GAP_PX: u32 = 28;
-const MARGIN_PX: u32 = 36;
+/// Blank between panels, in sixteenths of the text's size.
+const GAP: u32 = 14;
+/// The least edge of a panel beside others.
+const LEAST: u32 = 172;
+/// Room for the labels of millimetres left of the first panel of a row.
+const AXIS: u32 = 36;
 
 /// One image with its title and notes.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,10 +43,9 @@ pub struct Panel {
     pub unit: Unit,
     /// Lines below the image, such as `PSNR 23.4 dB  SSIM 0.81`.
     pub caption: Vec<String>,
-    /// Reasons not to trust the image, below the image in amber.
+    /// Reasons not to trust the image, below the image in the colour of warnings.
     pub warnings: Vec<String>,
-    /// Width of what the image shows on the target, for a bar in millimetres below the image;
-    /// `None` for no bar.
+    /// Width of what the image shows on the target, for axes in millimetres; `None` for no axes.
     pub field_mm: Option<f64>,
 }
 
@@ -70,7 +68,7 @@ impl Panel {
 
     /// An image, stretched, without caption and warnings.
     #[must_use]
-    pub fn of_image(title: &str, image: &Image<impl Shape>, unit: Unit) -> Self {
+    pub fn of_image(title: &str, image: &Image<impl nirspi_recon::Shape>, unit: Unit) -> Self {
         let (width, height) = (image.size().width(), image.size().height());
         Self { width, height, ..Self::square(title, width, image.pixels(), unit) }
     }
@@ -100,25 +98,38 @@ impl Panel {
         })
     }
 
-    /// Columns and rows of the image in the picture, in a panel of this edge. Beside other panels
-    /// an image that is nearly as large as a panel fills the panel.
-    fn shown_px(&self, panel_px: u32, is_alone: bool) -> (u32, u32) {
+    /// Columns and rows of the image in a panel of this edge. Images beside each other are of one
+    /// size. A single image has whole pixels, unless it is larger than the panel.
+    fn shown_px(&self, edge: u32, is_alone: bool) -> (u32, u32) {
         let (width, height) = (self.width as u32, self.height as u32);
-        let (longer, shorter) = (width.max(height), width.min(height));
-        let fills = longer > panel_px || (!is_alone && 2 * longer > panel_px);
-        if fills {
-            let scaled = |edge| (u64::from(edge) * u64::from(panel_px) / u64::from(longer)) as u32;
-            return (scaled(width).max(1), scaled(height).max(1));
+        let longer = width.max(height);
+        if is_alone && longer <= edge {
+            let factor = edge / longer;
+            return (width * factor, height * factor);
         }
-        let mut factor = panel_px / longer;
-        if longer == shorter {
-            factor = factor.max(LEAST_PX.div_ceil(shorter));
-        }
-        (width * factor, height * factor)
+        let scaled = |side| (u64::from(side) * u64::from(edge) / u64::from(longer)) as u32;
+        (scaled(width).max(1), scaled(height).max(1))
+    }
+
+    /// Draws the image.
+    fn draw(&self, canvas: &mut Drawing, look: &Look, scale: &Scale, at: [u32; 4]) {
+        assert!(
+            self.values.len() == self.width * self.height && !self.values.is_empty(),
+            "values of a panel"
+        );
+        let [left, top, wide, high] = at;
+        let edge = look.px(1).max(1);
+        canvas
+            .rect([left - edge, top - edge, wide + 2 * edge, high + 2 * edge], look.palette.frame);
+        let levels = self.values.iter().map(|&value| to_level(scale.level(value))).collect();
+        let columns = self.width as u32;
+        // The camera's pixels stay square and unmixed. A photograph's pixels are not looked at.
+        let smooth = wide < 3 * columns && !wide.is_multiple_of(columns);
+        canvas.shapes.push(Shape::Image { at, columns, levels, smooth });
     }
 }
 
-/// A row of panels with a header and a footer line. Empty texts take no room.
+/// Panels in rows with a header and a footer line. Empty texts take no room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideBySide {
     /// The header, such as `Letter R at 0.3 m`.
@@ -136,118 +147,151 @@ impl From<Panel> for SideBySide {
 }
 
 impl SideBySide {
-    /// Draws the picture without its provenance; [`signed_png`](super::signed_png) makes a PNG of it.
+    /// Draws the picture in this width, without its provenance, and says where a single image is.
     ///
     /// # Panics
     /// If there is no panel, or a panel does not have exactly `width * height` values, at least
     /// one.
-    #[must_use]
-    pub fn render(&self) -> RgbImage {
-        self.draw(PANEL_PX).0
-    }
-
-    /// As [`render`](Self::render), with panels of another edge.
-    #[must_use]
-    pub fn render_at(&self, panel_px: u32) -> RgbImage {
-        self.draw(panel_px).0
-    }
-
-    /// The picture as a PNG, with its provenance below it. Readers of this program find the image of
-    /// a single panel in the picture, and refuse a picture of several.
-    ///
-    /// # Panics
-    /// As [`render`](Self::render).
-    #[must_use]
-    pub fn png(&self, provenance: &Provenance) -> Vec<u8> {
-        let (picture, placed) = self.draw(PANEL_PX);
-        encode_labelled(&signed(&picture, provenance), self.panels.len(), placed, provenance)
-    }
-
-    /// Rows of the picture.
-    pub(super) fn height(&self) -> u32 {
-        self.lay(PANEL_PX).height
-    }
-
-    fn lay(&self, panel_px: u32) -> Laid {
+    pub(super) fn draw(&self, look: &Look, width: u32) -> (Drawing, Option<Placed>) {
         assert!(!self.panels.is_empty(), "a picture of at least one panel");
-        let columns = self.panels.len() as u32;
-        let shown = |panel: &Panel| panel.shown_px(panel_px, columns == 1);
-        let shown: Vec<(u32, u32)> = self.panels.iter().map(shown).collect();
-        let edge = shown.iter().map(|&(w, h)| w.max(h)).max().unwrap_or(0).max(LEAST_PX);
-        let edge = if columns == 1 { edge } else { edge.max(panel_px) };
-        let inner = columns * edge + (columns - 1) * GAP_PX;
-        let scales: Vec<Scale> = self.panels.iter().map(Panel::scale).collect();
+        let margin = look.px(MARGIN);
+        let inner = width - 2 * margin;
+        let header = Block::new(Style::header(look), [self.header.as_str()], inner);
+        let footer =
+            Block::new(Style::faint(look), [self.footer.as_str(), &self.stretch_line()], inner);
+        let (columns, edge) = self.columns(look, inner);
+        let rows: Vec<(Drawing, Option<Placed>)> =
+            self.panels.chunks(columns).map(|row| self.row(look, row, inner, edge)).collect();
+        let rows_px: u32 = rows.iter().map(|(row, _)| row.height).sum();
+        let top = margin + header.height_and(look.px(8));
+        let height = top + rows_px + footer.height() + margin / 2;
+        let mut canvas = Drawing::new(look, width, height);
+        header.draw(&mut canvas, margin, margin);
+        let (mut top, mut placed) = (top, None);
+        for (row, found) in rows {
+            placed = found.map(|found| Placed {
+                left: found.left + margin,
+                top: found.top + top,
+                ..found
+            });
+            let high = row.height;
+            canvas.place(row, margin, top);
+            top += high;
+        }
+        footer.draw(&mut canvas, margin, top);
+        (canvas, placed)
+    }
 
-        let header = Block::new(HEADER, [self.header.as_str()], inner);
-        let titles = self.blocks(TITLE, edge, |panel| vec![panel.title.as_str()]);
-        let ranges: Vec<Block> =
-            scales.iter().map(|scale| Block::new(RANGE, [scale.line().as_str()], edge)).collect();
-        let warnings =
-            self.blocks(WARNING, edge, |panel| panel.warnings.iter().map(String::as_str).collect());
-        let captions =
-            self.blocks(CAPTION, edge, |panel| panel.caption.iter().map(String::as_str).collect());
-        let footer = Block::new(FOOTER, [self.footer.as_str(), &self.stretch_line()], inner);
+    /// Width of the picture, which is smaller for a single image.
+    pub(super) fn width(&self, look: &Look) -> u32 {
+        if self.panels.len() == 1 { look.single().min(look.width()) } else { look.width() }
+    }
+
+    /// Whether there are axes in millimetres.
+    fn has_axes(&self) -> bool {
+        self.panels.iter().any(|panel| panel.field_mm.is_some())
+    }
+
+    /// Panels in a row, and the edge of each.
+    fn columns(&self, look: &Look, inner: u32) -> (usize, u32) {
+        let axis = if self.has_axes() { look.px(AXIS) } else { 0 };
+        let (gap, count) = (look.px(GAP), self.panels.len() as u32);
+        let most = ((inner - axis + gap) / (look.px(LEAST) + gap)).max(1);
+        let columns = count.div_ceil(count.div_ceil(most));
+        // A frame extends beyond its image.
+        let edge = (inner - axis - (columns - 1) * gap) / columns - 2 * look.px(1);
+        (columns as usize, edge)
+    }
+
+    /// A row of panels without margins.
+    fn row(
+        &self,
+        look: &Look,
+        panels: &[Panel],
+        inner: u32,
+        edge: u32,
+    ) -> (Drawing, Option<Placed>) {
+        let is_alone = self.panels.len() == 1;
+        let axis = if self.has_axes() { look.px(AXIS) } else { 0 };
+        let scales: Vec<Scale> = panels.iter().map(Panel::scale).collect();
+        let shared = panels.len() > 1 && scales.iter().all(|scale| scale.is_drawn_as(&scales[0]));
+        let shown: Vec<(u32, u32)> =
+            panels.iter().map(|panel| panel.shown_px(edge, is_alone)).collect();
+        let tall = shown.iter().map(|&(_, high)| high).max().unwrap_or(1);
+        let plain = Style::plain(look);
+
+        let titles = blocks(panels, Style::title(look), edge, |panel| vec![&panel.title]);
+        let ranges: Vec<Block> = scales
+            .iter()
+            .map(|scale| if shared { scale.found() } else { scale.line() })
+            .map(|line| Block::new(plain, [line.as_str()], edge))
+            .collect();
+        let warnings = blocks(panels, Style::warning(look), edge, |p| p.warnings.iter().collect());
+        let captions = blocks(panels, plain, edge, |p| p.caption.iter().collect());
+        let common = if shared { units(&scales) } else { String::new() };
+        let common = Block::new(plain, [common.as_str()], inner - axis);
         let tallest = |blocks: &[Block]| blocks.iter().map(Block::height).max().unwrap_or(0);
 
-        let title_top = MARGIN_PX + header.height_and(18);
-        let image_top = title_top + spaced(tallest(&titles), 10);
-        let has_length = self.panels.iter().any(|panel| panel.field_mm.is_some());
-        let length_top = image_top + edge + 6;
-        let bar_top = length_top + if has_length { scale_bar::HEIGHT_PX } else { 0 } + 6;
-        let range_top = bar_top + bar::HEIGHT_PX + 4;
-        let warning_top = range_top + spaced(tallest(&ranges), 8);
-        let caption_top = warning_top + spaced(tallest(&warnings), 8);
-        let footer_top = caption_top + spaced(tallest(&captions), 16);
-        let height = footer_top + footer.height() + MARGIN_PX;
-        Laid {
-            shown,
-            edge,
-            inner,
-            scales,
-            header,
-            titles,
-            ranges,
-            warnings,
-            captions,
-            footer,
-            image_top,
-            length_top,
-            bar_top,
-            range_top,
-            warning_top,
-            caption_top,
-            footer_top,
-            height,
-        }
-    }
+        let image_top = spaced(tallest(&titles), look.px(4)) + look.px(1);
+        let axis_top = image_top + tall + look.px(1);
+        let axis_px = if axis > 0 { look.px(4) + plain.line_px } else { 0 };
+        let bar_top = axis_top + axis_px + look.px(5);
+        let own_bar_px = if shared { 0 } else { bar::height(look) + look.px(2) };
+        let text_top = bar_top + own_bar_px;
+        // Texts of a panel follow each other.
+        let text_px = |column: usize| {
+            let blocks = [&ranges[column], &warnings[column], &captions[column]];
+            blocks.map(|block| spaced(block.height(), look.px(3))).iter().sum::<u32>()
+        };
+        let most_text = (0..panels.len()).map(text_px).max().unwrap_or(0);
+        let common_top = text_top + most_text + look.px(4);
+        let common_px = if shared { bar::height(look) + common.height() + look.px(4) } else { 0 };
+        let height = common_top + common_px + look.px(8);
 
-    /// The picture, and the place of a single image in it.
-    fn draw(&self, panel_px: u32) -> (RgbImage, Option<Placed>) {
-        let laid = self.lay(panel_px);
-        let mut canvas = RgbImage::from_pixel(laid.inner + 2 * MARGIN_PX, laid.height, GROUND);
-        laid.header.draw(&mut canvas, MARGIN_PX, MARGIN_PX);
+        let mut canvas = Drawing::new(look, inner, height);
         let mut placed = None;
-        for (column, panel) in self.panels.iter().enumerate() {
-            let left = MARGIN_PX + column as u32 * (laid.edge + GAP_PX);
-            let title = &laid.titles[column];
+        for (column, panel) in panels.iter().enumerate() {
+            let left = axis + column as u32 * (edge + 2 * look.px(1) + look.px(GAP)) + look.px(1);
+            let title = &titles[column];
             // A short title is directly above its image, also if a neighbour's title has more
             // lines.
-            title.draw(&mut canvas, left, laid.image_top - spaced(title.height(), 10));
-            let (scale, (wide, high)) = (&laid.scales[column], laid.shown[column]);
-            let (x, y) = (left + (laid.edge - wide) / 2, laid.image_top + (laid.edge - high) / 2);
-            draw_image(&mut canvas, panel, scale, (wide, high), (x, y));
-            if self.panels.len() == 1 {
-                placed = panel.placed(scale, (wide, high), (x, y));
+            let title_top = image_top - look.px(1) - spaced(title.height(), look.px(4));
+            title.draw(&mut canvas, left, title_top);
+            let (scale, (wide, high)) = (&scales[column], shown[column]);
+            panel.draw(&mut canvas, look, scale, [left, image_top, wide, high]);
+            if is_alone {
+                placed = panel.placed(scale, (wide, high), (left, image_top));
             }
             if let Some(field_mm) = panel.field_mm {
-                draw_scale_bar(&mut canvas, field_mm, wide, (x, laid.length_top));
+                let at = [left, image_top, wide, high];
+                draw_axes(&mut canvas, look, field_mm, at, column == 0);
             }
-            draw_bar(&mut canvas, scale, (left, laid.bar_top), laid.edge);
-            laid.ranges[column].draw(&mut canvas, left, laid.range_top);
-            laid.warnings[column].draw(&mut canvas, left, laid.warning_top);
-            laid.captions[column].draw(&mut canvas, left, laid.caption_top);
+            if !shared {
+                draw_bar(
+                    &mut canvas,
+                    look,
+                    scale,
+                    (left, bar_top),
+                    if is_alone { wide.max(look.px(LEAST)) } else { edge },
+                );
+            }
+            let mut top = text_top;
+            for block in [&ranges[column], &warnings[column], &captions[column]] {
+                block.draw(&mut canvas, left, top);
+                top += spaced(block.height(), look.px(3));
+            }
         }
-        laid.footer.draw(&mut canvas, MARGIN_PX, laid.footer_top);
+        if shared {
+            let wide = panels.len() as u32 * (edge + 2 * look.px(1) + look.px(GAP)) - look.px(GAP);
+            draw_bar(
+                &mut canvas,
+                look,
+                &scales[0],
+                (axis + look.px(1), common_top),
+                wide - 2 * look.px(1),
+            );
+            common.draw(&mut canvas, axis + look.px(1), common_top + bar::height(look));
+        }
         (canvas, placed)
     }
 
@@ -258,40 +302,59 @@ impl SideBySide {
             false => String::new(),
         }
     }
-
-    fn blocks<'a>(
-        &'a self,
-        style: fn() -> Style,
-        width_px: u32,
-        texts: impl Fn(&'a Panel) -> Vec<&'a str>,
-    ) -> Vec<Block> {
-        self.panels.iter().map(|panel| Block::new(style, texts(panel), width_px)).collect()
-    }
 }
 
-/// The texts of a picture in lines, and where everything is.
-struct Laid {
-    /// Columns and rows of each image in the picture.
-    shown: Vec<(u32, u32)>,
-    /// Edge of a panel.
-    edge: u32,
-    /// Width without margins.
-    inner: u32,
-    scales: Vec<Scale>,
-    header: Block,
-    titles: Vec<Block>,
-    ranges: Vec<Block>,
-    warnings: Vec<Block>,
-    captions: Vec<Block>,
-    footer: Block,
-    image_top: u32,
-    length_top: u32,
-    bar_top: u32,
-    range_top: u32,
-    warning_top: u32,
-    caption_top: u32,
-    footer_top: u32,
-    height: u32,
+/// The units of a scale that images share.
+fn units(scales: &[Scale]) -> String {
+    let mut names: Vec<&str> = scales.iter().map(|scale| scale.unit.name()).collect();
+    names.dedup();
+    names.join(", ")
+}
+
+fn blocks<'a>(
+    panels: &'a [Panel],
+    style: Style,
+    width: u32,
+    texts: impl Fn(&'a Panel) -> Vec<&'a String>,
+) -> Vec<Block> {
+    let block = |panel| Block::new(style, texts(panel).into_iter().map(String::as_str), width);
+    panels.iter().map(block).collect()
+}
+
+/// Millimetres below an image and, for the first of a row, left of it: 0 is the lower left corner.
+fn draw_axes(
+    canvas: &mut Drawing,
+    look: &Look,
+    field_mm: f64,
+    [left, top, wide, high]: [u32; 4],
+    with_vertical: bool,
+) {
+    let style = Style::plain(look);
+    // The last label has the unit, and must not touch the one before.
+    let round = between(0.0, field_mm, if wide < look.px(288) { 3 } else { 5 });
+    let below = top + high + look.px(1);
+    let per_mm = f64::from(wide) / field_mm;
+    let last = round.len().saturating_sub(1);
+    let words = |(k, mm): (usize, &f64)| {
+        let unit = if k == last { " mm" } else { "" };
+        (f64::from(left) + mm * per_mm, format!("{}{unit}", label(*mm)))
+    };
+    let ticks: Vec<(f64, String)> = round.iter().enumerate().map(words).collect();
+    draw_ticks(canvas, look, &ticks, below, (left, left + wide));
+    if with_vertical {
+        let edge = f64::from(left - look.px(1));
+        for mm in round {
+            let y = f64::from(top + high) - mm * per_mm;
+            if y + 1.0 < f64::from(top) {
+                continue;
+            }
+            let start = edge - f64::from(look.px(4));
+            canvas.line([(start, y), (edge, y)], f64::from(look.px(1)), style.colour);
+            let text = label(mm);
+            let x = start as f32 - look.px(2) as f32 - style.width(&text);
+            style.draw(canvas, &text, x.max(0.0), y as f32 - style.line_px as f32 / 2.0);
+        }
+    }
 }
 
 /// The rule of stretched pictures in words.
@@ -300,279 +363,10 @@ pub(super) fn stretch_words(of: &str) -> String {
     format!("black and white: percentiles {low} and {high} of {of}")
 }
 
-/// Rows of panels below each other, with aligned left edges.
-///
-/// # Panics
-/// As [`SideBySide::render`].
-#[must_use]
-pub fn stacked(rows: &[SideBySide]) -> RgbImage {
-    below(&rows.iter().map(SideBySide::render).collect::<Vec<_>>())
-}
-
-/// Ground of so many columns and rows.
-#[must_use]
-pub fn blank(width: u32, height: u32) -> RgbImage {
-    RgbImage::from_pixel(width, height, GROUND)
-}
-
-/// Pictures below each other, with aligned left edges.
-#[must_use]
-pub fn below(pictures: &[RgbImage]) -> RgbImage {
-    let width = pictures.iter().map(RgbImage::width).max().unwrap_or(1);
-    let height = pictures.iter().map(RgbImage::height).sum::<u32>().max(1);
-    let mut canvas = RgbImage::from_pixel(width, height, GROUND);
-    let mut top = 0;
-    for picture in pictures {
-        imageops::replace(&mut canvas, picture, 0, i64::from(top));
-        top += picture.height();
-    }
-    canvas
-}
-
-/// Pictures beside each other, with aligned upper edges.
-#[must_use]
-pub fn beside(pictures: &[RgbImage]) -> RgbImage {
-    let width = pictures.iter().map(RgbImage::width).sum::<u32>().max(1);
-    let height = pictures.iter().map(RgbImage::height).max().unwrap_or(1);
-    let mut canvas = RgbImage::from_pixel(width, height, GROUND);
-    let mut left = 0;
-    for picture in pictures {
-        imageops::replace(&mut canvas, picture, i64::from(left), 0);
-        left += picture.width();
-    }
-    canvas
-}
-
-pub(super) const HEADER: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 32.0, line_px: 40, colour: BRIGHT };
-const TITLE: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 23.0, line_px: 28, colour: BRIGHT };
-const RANGE: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 17.0, line_px: 22, colour: MIDDLE };
-const CAPTION: fn() -> Style =
-    || Style { font: Font::mono(), size_px: 16.0, line_px: 22, colour: MIDDLE };
-pub(super) const WARNING: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 19.0, line_px: 26, colour: AMBER };
-
 /// A height and the space after it. A height of 0 gets no space.
 pub(super) fn spaced(height_px: u32, space_px: u32) -> u32 {
     if height_px == 0 { 0 } else { height_px + space_px }
 }
 
-fn draw_image(
-    canvas: &mut RgbImage,
-    panel: &Panel,
-    scale: &Scale,
-    (wide, high): (u32, u32),
-    (x0, y0): (u32, u32),
-) {
-    let (width, height) = (panel.width as u32, panel.height as u32);
-    assert!(
-        panel.values.len() == panel.width * panel.height && !panel.values.is_empty(),
-        "values of a panel"
-    );
-    let grey: Vec<f32> = panel.values.iter().map(|&value| scale.level(value)).collect();
-    let grey: ImageBuffer<Luma<f32>, _> =
-        ImageBuffer::from_raw(width, height, grey).expect("a panel has width * height values");
-
-    // Whole multiples keep the camera's pixels square and unmixed.
-    let whole = wide.is_multiple_of(width) && high.is_multiple_of(height);
-    let filter = if whole { FilterType::Nearest } else { FilterType::Triangle };
-    let shown = imageops::resize(&grey, wide, high, filter);
-    for y in 0..high + 2 {
-        for x in 0..wide + 2 {
-            canvas.put_pixel(x0 + x - 1, y0 + y - 1, FRAME);
-        }
-    }
-    for (x, y, pixel) in shown.enumerate_pixels() {
-        let level = to_level(pixel.0[0]);
-        canvas.put_pixel(x0 + x, y0 + y, Rgb([level; 3]));
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn panel(title: &str, side: usize, caption: &[&str]) -> Panel {
-        Panel {
-            title: title.to_owned(),
-            width: side,
-            height: side,
-            values: (0..side * side).map(|i| i as f32 / (side * side - 1) as f32).collect(),
-            range: Range::Unit,
-            unit: Unit::OfWhite,
-            caption: caption.iter().map(|&line| line.to_owned()).collect(),
-            warnings: Vec::new(),
-            field_mm: None,
-        }
-    }
-
-    #[test]
-    fn images_of_one_field_have_bars_of_one_length() {
-        let with = |side: usize, field_mm| Panel { field_mm, ..panel("", side, &[]) };
-        let bars = |panels: Vec<Panel>| {
-            let picture = side_by_side("", panels, "");
-            let canvas = picture.render();
-            let y = picture.lay(PANEL_PX).length_top + scale_bar::HEIGHT_PX / 2;
-            let lit = |from: u32| {
-                // The label begins after a gap.
-                (from..).take_while(|&x| *canvas.get_pixel(x, y) == MIDDLE).count()
-            };
-            [0, 1].map(|column| lit(MARGIN_PX + column * (PANEL_PX + GAP_PX)))
-        };
-        // 20 of 96 mm in 384 pixels.
-        assert_eq!(bars(vec![with(32, Some(96.0)), with(64, Some(96.0))]), [80, 80]);
-        let height = |field_mm| side_by_side("", vec![with(32, field_mm)], "").render().height();
-        assert_eq!(height(Some(96.0)), height(None) + scale_bar::HEIGHT_PX);
-    }
-
-    #[test]
-    fn an_image_is_enlarged_by_a_whole_factor_to_256_pixels_at_least() {
-        for side in (1..300).chain([512]) {
-            let panel = Panel::square("", side, &vec![0.0; side * side], Unit::OfWhite);
-            let (wide, high) = panel.shown_px(PANEL_PX, true);
-            assert!(wide == high && wide >= LEAST_PX, "{side}: {wide} x {high}");
-            assert!(side > 384 || (wide as usize).is_multiple_of(side), "{side}: {wide}");
-        }
-        let of = |width, height| {
-            let values = vec![0.0; width * height];
-            Panel { width, height, values, ..Panel::square("", 0, &[], Unit::OfWhite) }
-        };
-        assert_eq!(of(7, 3).shown_px(PANEL_PX, true), (378, 162));
-        assert_eq!(of(3, 700).shown_px(PANEL_PX, true), (1, 384));
-        assert_eq!(of(100, 900).shown_px(PANEL_PX, true), (42, 384));
-        // A scene of 256 pixels beside the camera's image.
-        assert_eq!(of(256, 256).shown_px(PANEL_PX, false), (384, 384));
-        assert_eq!(of(128, 128).shown_px(PANEL_PX, false), (384, 384));
-    }
-
-    #[test]
-    fn the_bar_goes_from_black_to_white_and_has_ticks_in_the_units_of_the_image() {
-        let canvas = side_by_side("", vec![panel("", 32, &[])], "").render();
-        let row = MARGIN_PX + PANEL_PX + 12 + 7;
-        let greys: Vec<u8> =
-            (1..PANEL_PX - 1).map(|x| canvas.get_pixel(MARGIN_PX + x, row).0[0]).collect();
-        assert!(greys.is_sorted() && greys[0] <= 1 && greys[381] >= 254, "{greys:?}");
-        // A tick at 0.2 of 0 to 1, below the bar.
-        let tick = MARGIN_PX + (0.2 * f64::from(PANEL_PX - 1)).round() as u32;
-        assert_eq!(*canvas.get_pixel(tick, MARGIN_PX + PANEL_PX + 12 + 15), MIDDLE);
-    }
-
-    fn side_by_side(header: &str, panels: Vec<Panel>, footer: &str) -> SideBySide {
-        SideBySide { header: header.to_owned(), panels, footer: footer.to_owned() }
-    }
-
-    fn is_blank(
-        canvas: &RgbImage,
-        columns: impl Iterator<Item = u32> + Clone,
-        rows: std::ops::Range<u32>,
-    ) -> bool {
-        rows.into_iter().all(|y| columns.clone().all(|x| *canvas.get_pixel(x, y) == GROUND))
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
-        #[test]
-        fn text_of_any_length_stays_inside_its_panel(
-            texts in prop::collection::vec("[ -~µ×−\n]{0,90}|[a-zW@]{60,90}", 7),
-        ) {
-            let left = panel(&texts[0], 32, &[&texts[1], &texts[2]]);
-            let panels = vec![left, panel(&texts[3], 64, &[&texts[4]])];
-            let canvas = side_by_side(&texts[5], panels, &texts[6]).render();
-            let (width, height) = canvas.dimensions();
-            prop_assert_eq!(width, 2 * MARGIN_PX + 2 * PANEL_PX + GAP_PX);
-            // A glyph may extend beyond its box by a pixel or two.
-            let lean = 3;
-            prop_assert!(is_blank(&canvas, 0..MARGIN_PX - lean, 0..height));
-            prop_assert!(is_blank(&canvas, width - MARGIN_PX + lean..width, 0..height));
-            prop_assert!(is_blank(&canvas, 0..width, 0..MARGIN_PX - lean));
-            prop_assert!(is_blank(&canvas, 0..width, height - MARGIN_PX + lean..height));
-            // Between the panels only header and footer, which are as wide as both panels, may be
-            // drawn.
-            let inner = 2 * PANEL_PX + GAP_PX;
-            let header = Block::new(HEADER, [texts[5].as_str()], inner).height_and(18);
-            let footer = Block::new(FOOTER, [texts[6].as_str()], inner).height();
-            let gap = MARGIN_PX + PANEL_PX + lean..MARGIN_PX + PANEL_PX + GAP_PX - lean;
-            let rows = MARGIN_PX + header..height - MARGIN_PX - footer;
-            prop_assert!(is_blank(&canvas, gap, rows));
-        }
-    }
-
-    #[test]
-    fn pixels_of_the_camera_stay_square_and_unmixed() {
-        let canvas = side_by_side("", vec![panel("", 32, &[])], "").render();
-        let cell = PANEL_PX / 32;
-        for row in 0..32 {
-            for column in 0..32 {
-                let level = to_level((row * 32 + column) as f32 / 1023.0);
-                for (dx, dy) in [(0, 0), (cell - 1, 0), (0, cell - 1), (cell - 1, cell - 1)] {
-                    let found = canvas
-                        .get_pixel(MARGIN_PX + column * cell + dx, MARGIN_PX + row * cell + dy);
-                    assert_eq!(*found, Rgb([level; 3]), "{row} {column} {dx} {dy}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_range_says_what_is_black_and_white() {
-        let levels = |range| {
-            let values = vec![-1.0, 0.0, 0.5, 3.0];
-            let panel = Panel { width: 2, height: 2, values, range, ..panel("", 2, &[]) };
-            let canvas = side_by_side("", vec![panel], "").render();
-            let half = PANEL_PX / 2;
-            [(0, 0), (half, 0), (0, half), (half, half)]
-                .map(|(x, y)| canvas.get_pixel(MARGIN_PX + x, MARGIN_PX + y).0[0])
-        };
-        assert_eq!(levels(Range::Unit), [0, 0, 128, 255]);
-        // 200 values and more have percentiles of their own; of four, these are the ends.
-        assert_eq!(levels(Range::Stretched), [0, 64, 96, 255]);
-        assert_eq!(levels(Range::Fixed(0.0, 0.5)), [0, 0, 255, 255]);
-    }
-
-    #[test]
-    fn flat_wide_and_broken_images_are_drawn_too() {
-        for (width, height, value) in
-            [(1, 1, 0.5), (7, 3, 0.0), (3, 700, 1.0), (2, 2, f32::NAN), (2, 2, f32::INFINITY)]
-        {
-            for range in [Range::Unit, Range::Stretched, Range::Fixed(1.0, 1.0)] {
-                let values = vec![value; width * height];
-                let odd = Panel { width, height, values, range, ..panel("odd", 2, &["x"]) };
-                let canvas = side_by_side("h", vec![odd], "f").render();
-                let wide = LEAST_PX + 2 * MARGIN_PX..=PANEL_PX + 2 * MARGIN_PX;
-                assert!(wide.contains(&canvas.width()), "{width} x {height}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_warning_is_drawn_below_its_image_in_amber() {
-        let warned =
-            Panel { warnings: vec!["too little light".to_owned()], ..panel("", 2, &["x"]) };
-        let canvas = side_by_side("", vec![panel("", 2, &["x"]), warned], "").render();
-        let amber = |from: u32| {
-            let columns = from..from + PANEL_PX;
-            let rows = MARGIN_PX + PANEL_PX..canvas.height();
-            rows.flat_map(|y| columns.clone().map(move |x| (x, y)))
-                // Glyphs are anti-aliased: much red, little blue.
-                .filter(|&(x, y)| {
-                    let [red, _, blue] = canvas.get_pixel(x, y).0;
-                    red > 100 && red / 2 > blue
-                })
-                .count()
-        };
-        assert_eq!(amber(MARGIN_PX), 0);
-        assert!(amber(MARGIN_PX + PANEL_PX + GAP_PX) > 20);
-    }
-
-    #[test]
-    fn more_text_makes_a_taller_picture_and_less_a_lower_one() {
-        let height =
-            |caption: &str| side_by_side("", vec![panel("", 2, &[caption])], "").render().height();
-        let below = 12 + bar::HEIGHT_PX + 4 + 22 + 8;
-        assert_eq!(height(""), 2 * MARGIN_PX + PANEL_PX + below);
-        assert!(height(&"word ".repeat(40)) > height("word") && height("word") > height(""));
-    }
-}
+mod tests;

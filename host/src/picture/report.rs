@@ -4,7 +4,9 @@
 //! A picture that shows fewer images than there are says so, in the picture, in the report and in
 //! words (`tests::what_is_left_out_is_said_in_the_report_and_in_words`).
 
+use super::figure::Figure;
 use super::layout::{Panel, SideBySide};
+use super::look::FigureStyle;
 use super::scale::{PERCENTILES, Range, Scale, Unit};
 use super::sheet::Sheet;
 use super::video;
@@ -23,6 +25,8 @@ use std::path::Path;
 pub struct Pictures {
     entries: Vec<Entry>,
     #[serde(skip)]
+    style: FigureStyle,
+    #[serde(skip)]
     provenance: Provenance,
 }
 
@@ -37,8 +41,9 @@ struct Entry {
     percentiles: Option<[f64; 2]>,
     /// A range for each image, or one for all.
     images: Vec<Shown>,
+    /// The picture, then the same in other formats: names and bytes.
     #[serde(skip)]
-    bytes: Vec<u8>,
+    files: Vec<(String, Vec<u8>)>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -52,8 +57,8 @@ struct Shown {
 impl Pictures {
     /// No picture yet.
     #[must_use]
-    pub fn new(provenance: &Provenance) -> Self {
-        Self { entries: Vec::new(), provenance: provenance.clone() }
+    pub fn new(style: FigureStyle, provenance: &Provenance) -> Self {
+        Self { entries: Vec::new(), style, provenance: provenance.clone() }
     }
 
     /// The provenance of all pictures.
@@ -62,11 +67,18 @@ impl Pictures {
         &self.provenance
     }
 
-    /// Draws panels side by side.
+    /// Draws panels side by side: a PNG of this name, and SVG and PDF beside it.
     ///
     /// # Panics
-    /// As [`SideBySide::render`].
-    pub fn add(&mut self, file: &str, picture: &SideBySide) {
+    /// As [`Figure::draw`].
+    pub fn add(&mut self, file: &str, picture: SideBySide) {
+        let figure = Figure::Images(picture);
+        let files = figure.files(self.style, &self.provenance);
+        self.images(file, &figure, named(file, files));
+    }
+
+    fn images(&mut self, file: &str, figure: &Figure, files: Vec<(String, Vec<u8>)>) {
+        let Figure::Images(picture) = figure else { return };
         let shown = |panel: &Panel| Shown { title: panel.title.clone(), scale: panel.scale() };
         let count = picture.panels.len();
         let stretched = picture.panels.iter().any(|panel| panel.range == Range::Stretched);
@@ -76,25 +88,28 @@ impl Pictures {
             of: count,
             percentiles: stretched.then_some(PERCENTILES),
             images: picture.panels.iter().map(shown).collect(),
-            bytes: picture.png(&self.provenance),
+            files,
         });
     }
 
-    /// Draws one image.
+    /// Draws one image: a PNG of this name, and SVG and PDF beside it.
     ///
     /// # Panics
-    /// As [`SideBySide::render`].
+    /// As [`Figure::draw`].
     pub fn single(&mut self, file: &str, panel: Panel) {
-        self.add(file, &panel.into());
+        self.add(file, panel.into());
     }
 
-    /// Draws each panel of a picture by itself, in files of these names.
+    /// Draws each panel of a picture by itself, as a PNG of this name.
     ///
     /// # Panics
-    /// As [`SideBySide::render`].
+    /// As [`Figure::draw`].
     pub fn each(&mut self, names: &[&str], panels: &[Panel]) {
         for (name, panel) in names.iter().zip(panels) {
-            self.single(&format!("{name}.png"), panel.clone());
+            let file = format!("{name}.png");
+            let figure = Figure::Images(panel.clone().into());
+            let png = figure.png(&self.style.look(), &self.provenance);
+            self.images(&file, &figure, vec![(file.clone(), png)]);
         }
     }
 
@@ -105,9 +120,10 @@ impl Pictures {
         image: &Image<impl Shape>,
         unit: Unit,
         enhanced: Option<(&[f32], Vec<String>)>,
+        style: FigureStyle,
         provenance: &Provenance,
     ) -> Self {
-        let mut pictures = Self::new(provenance);
+        let mut pictures = Self::new(style, provenance);
         let panel = Panel::of_image("reconstructed", image, unit);
         pictures.single("image.png", panel);
         if let Some((values, warnings)) = enhanced {
@@ -128,9 +144,10 @@ impl Pictures {
         images: &[Image],
         unit: Unit,
         enhanced: Option<(&[f32], Vec<usize>)>,
+        style: FigureStyle,
         provenance: &Provenance,
     ) -> Self {
-        let mut pictures = Self::new(provenance);
+        let mut pictures = Self::new(style, provenance);
         let header = format!("{header}, {} frames", images.len());
         let side = images[0].side().pixels();
         let values = images.iter().map(Image::pixels).collect();
@@ -145,25 +162,31 @@ impl Pictures {
         pictures
     }
 
-    /// Draws a contact sheet.
+    /// Draws a contact sheet: a PNG of this name, and SVG and PDF beside it.
     pub fn sheet(&mut self, file: &str, sheet: &Sheet<'_>) {
-        let bytes = sheet.png(&self.provenance);
-        self.many(file, sheet, sheet.shown().len(), bytes);
+        let files = named(file, sheet.files(self.style, &self.provenance));
+        self.many(file, sheet, sheet.shown().len(), files);
     }
 
     /// Draws a contact sheet, `NAME.png`, and the same images as a video, `NAME.apng`: 100 of them at most,
     /// evenly chosen.
     pub fn sheet_and_video(&mut self, name: &str, sheet: &Sheet<'_>) {
         self.sheet(&format!("{name}.png"), sheet);
-        let video = video::beside(sheet, &self.provenance);
-        self.many(&format!("{name}.apng"), sheet, video.frames, video.bytes);
+        let video = video::beside(sheet, self.style, &self.provenance);
+        let file = format!("{name}.apng");
+        self.many(&file, sheet, video.frames, vec![(file.clone(), video.bytes)]);
     }
 
-    fn many(&mut self, file: &str, sheet: &Sheet<'_>, shown: usize, bytes: Vec<u8>) {
+    fn many(&mut self, file: &str, sheet: &Sheet<'_>, shown: usize, files: Vec<(String, Vec<u8>)>) {
         let of_scale = |(title, scale)| Shown { title, scale };
         let images = sheet.scales().into_iter().map(of_scale).collect();
         let (file, of) = (file.to_owned(), sheet.count());
-        self.entries.push(Entry { file, shown, of, percentiles: Some(PERCENTILES), images, bytes });
+        self.entries.push(Entry { file, shown, of, percentiles: Some(PERCENTILES), images, files });
+    }
+
+    /// All files, those beside the pictures among them.
+    fn files(&self) -> impl Iterator<Item = &(String, Vec<u8>)> {
+        self.entries.iter().flat_map(|entry| &entry.files)
     }
 
     /// Stages the files in a folder.
@@ -171,7 +194,7 @@ impl Pictures {
     /// # Errors
     /// [`FileError`] names the file and the system's reason.
     pub fn write(&self, out: &mut OutputDir) -> Result<(), FileError> {
-        self.entries.iter().try_for_each(|entry| out.write(&entry.file, &entry.bytes))
+        self.files().try_for_each(|(name, bytes)| out.write(name, bytes))
     }
 
     /// Writes the files, whose names are paths here.
@@ -179,9 +202,18 @@ impl Pictures {
     /// # Errors
     /// [`FileError`] names the file and the system's reason.
     pub fn write_files(&self, existing: Existing<'_>) -> Result<(), FileError> {
-        let write = |entry: &Entry| write_result(Path::new(&entry.file), existing, &entry.bytes);
-        self.entries.iter().try_for_each(write)
+        self.files().try_for_each(|(name, _)| existing.check(Path::new(name)))?;
+        self.files().try_for_each(|(name, bytes)| write_result(Path::new(name), existing, bytes))
     }
+}
+
+/// Files beside each other: the name of the PNG with other endings.
+fn named(png: &str, files: Vec<(&'static str, Vec<u8>)>) -> Vec<(String, Vec<u8>)> {
+    let name = |ending| match ending {
+        "png" => png.to_owned(),
+        _ => Path::new(png).with_extension(ending).display().to_string(),
+    };
+    files.into_iter().map(|(ending, bytes)| (name(ending), bytes)).collect()
 }
 
 /// The files in words, with what each leaves out.
@@ -205,7 +237,7 @@ mod tests {
 
     #[test]
     fn the_range_of_every_picture_is_in_the_report() {
-        let mut pictures = Pictures::new(&provenance());
+        let mut pictures = Pictures::new(FigureStyle::Paper, &provenance());
         let mut values = vec![1.0; 1024];
         values[..100].fill(-2.0);
         values[7] = 99.0;
@@ -227,7 +259,7 @@ mod tests {
         let values: Vec<f32> = (0..100 * 16).map(|p| (p % 16) as f32).collect();
         let images = values.chunks_exact(16).collect();
         let sheet = Sheet::new("frames".to_owned(), 4, images, Unit::Readings);
-        let mut pictures = Pictures::new(&provenance());
+        let mut pictures = Pictures::new(FigureStyle::Paper, &provenance());
         pictures.sheet_and_video("image", &sheet);
         assert_eq!(pictures.to_string(), "image.png (64 of 100 frames), image.apng");
         let report = serde_json::to_value(&pictures).unwrap();

@@ -135,6 +135,22 @@ impl Scale {
         if span > 0.0 && above > 0.0 { (above / span).min(1.0) as f32 } else { 0.0 }
     }
 
+    /// Whether both scales have the same grey for each value.
+    pub(super) fn is_drawn_as(&self, other: &Self) -> bool {
+        let of_one_kind =
+            self.unit == other.unit || (self.unit.is_fraction() && other.unit.is_fraction());
+        of_one_kind && (self.black, self.white) == (other.black, other.white)
+    }
+
+    /// The values of the image in words, where they are not those from black to white.
+    pub(super) fn found(&self) -> String {
+        let Self { black, white, least, most, .. } = *self;
+        match (black, white) == (least, most) {
+            true => String::new(),
+            false => format!("{} to {} found", number(least), number(most)),
+        }
+    }
+
     /// The range in words: the unit, what is shown, and what the image has beyond it.
     pub(super) fn line(&self) -> String {
         let Self { unit, black, white, least, most } = *self;

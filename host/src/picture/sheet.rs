@@ -5,31 +5,27 @@
 //! of how many (`tests::a_sheet_shows_the_first_and_the_last_and_says_how_many`).
 
 use super::bar::{self, draw_bar};
-use super::layout::{HEADER, WARNING, spaced, stretch_words};
+use super::drawing::{Drawing, Shape};
+use super::layout::{spaced, stretch_words};
+use super::look::{Colour, FigureStyle, Look};
 use super::scale::{Range, Scale, Unit};
-use super::signature::FOOTER;
-use super::signature::signed;
-use super::text::{Block, Font, Style};
+use super::signature::{MARGIN, signed};
+use super::text::{Block, Style};
 use super::ticks::number;
-use super::{AMBER, FRAME, GROUND, MIDDLE};
 use crate::files::image::{encode_labelled, to_level};
 use crate::provenance::Provenance;
-use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 
-/// Number of images in a row.
+/// The least edge of an image in the picture, in sixteenths of the text's size: its label stays
+/// below it.
+const TILE: u32 = 96;
+/// Most images in a row.
 const COLUMNS: usize = 8;
 /// The most images in the picture.
 const MOST: usize = 64;
-/// Least edge of an image in the picture, of many images and of few.
-const TILE_PX: usize = 128;
-const FEW_TILE_PX: usize = 256;
-/// So many images are few.
-const FEW: usize = 4;
-const GAP_PX: u32 = 12;
-const MARGIN_PX: u32 = 24;
+const GAP: u32 = 10;
 /// The grey bar is at most so wide.
-const BAR_PX: u32 = 512;
+const BAR: u32 = 512;
 /// An image of a smaller share of the common range would not be seen: then each has its own.
 const VISIBLE_SHARE: f32 = 0.125;
 
@@ -130,9 +126,25 @@ impl<'a> Sheet<'a> {
 
     /// The sheet as a PNG with its provenance, which this program's readers refuse as an image.
     #[must_use]
-    pub fn png(&self, provenance: &Provenance) -> Vec<u8> {
-        let picture = signed(&self.render(), provenance);
+    pub fn png(&self, look: &Look, provenance: &Provenance) -> Vec<u8> {
+        let picture = signed(self.draw(look), look, provenance).raster();
         encode_labelled(&picture, self.images.len(), None, provenance)
+    }
+
+    /// The sheet as files: endings and bytes of PNG, SVG and PDF.
+    #[must_use]
+    pub fn files(
+        &self,
+        style: FigureStyle,
+        provenance: &Provenance,
+    ) -> Vec<(&'static str, Vec<u8>)> {
+        let look = style.look();
+        let drawing = signed(self.draw(&look), &look, provenance);
+        vec![
+            ("png", self.png(&look, provenance)),
+            ("svg", drawing.svg(provenance).into_bytes()),
+            ("pdf", drawing.pdf(provenance)),
+        ]
     }
 
     /// What is shown of how many, and on which scale.
@@ -169,87 +181,83 @@ impl<'a> Sheet<'a> {
 
     /// Draws the sheet. Without images it has its text alone.
     #[must_use]
-    pub fn render(&self) -> RgbImage {
+    pub fn draw(&self, look: &Look) -> Drawing {
         let shown = self.shown();
-        let columns = shown.len().clamp(1, COLUMNS);
-        let least = if shown.len() <= FEW { FEW_TILE_PX } else { TILE_PX };
-        let cell = least.div_ceil(self.side).max(1);
-        let tile = (cell * self.side) as u32;
-        let inner = (columns as u32 * (tile + GAP_PX) - GAP_PX).max(FEW_TILE_PX as u32);
+        let (margin, gap) = (look.px(MARGIN), look.px(GAP));
+        let inner = look.width() - 2 * margin;
+        let most = (((inner + gap) / (look.px(TILE) + gap)) as usize).clamp(1, COLUMNS);
+        let columns = shown.len().clamp(1, most);
+        // Few images are not larger than a picture of one.
+        let room = (inner + gap) / columns as u32 - gap;
+        let side = self.side as u32;
+        let room = room.min(look.single());
+        let (cell, tile) = ((room / side).max(1), (room / side * side).max(room.min(side)));
 
-        let header = Block::new(HEADER, [self.header.as_str()], inner);
+        let header = Block::new(Style::header(look), [self.header.as_str()], inner);
         let labels: Vec<Block> = shown
             .iter()
             .map(|&index| {
-                let style = if self.is_warned(index) { WARNED } else { LABEL };
+                let style =
+                    if self.is_warned(index) { Style::warning(look) } else { Style::plain(look) };
                 Block::new(style, [self.label(index).as_str()], tile)
             })
             .collect();
         let label_px = labels.iter().map(Block::height).max().unwrap_or(0);
-        let warning = Block::new(WARNING, [self.warning().as_str()], inner);
+        let warning = Block::new(Style::warning(look), [self.warning().as_str()], inner);
         let lines = self.lines();
-        let footer = Block::new(FOOTER, lines.iter().map(String::as_str), inner);
+        let footer = Block::new(Style::faint(look), lines.iter().map(String::as_str), inner);
         let has_bar = matches!(self.scale, CommonOrOwn::Common(_));
         let rows = shown.len().div_ceil(columns) as u32;
 
-        let grid_top = MARGIN_PX + header.height_and(14);
-        let row_px = tile + 4 + label_px + GAP_PX;
+        let grid_top = margin + header.height_and(look.px(8));
+        let row_px = tile + look.px(3) + label_px + gap;
         let bar_top = grid_top + rows * row_px;
-        let warning_top = bar_top + if has_bar { bar::HEIGHT_PX + 8 } else { 0 };
-        let footer_top = warning_top + spaced(warning.height(), 8);
-        let height = footer_top + footer.height() + MARGIN_PX;
-        let mut canvas = RgbImage::from_pixel(inner + 2 * MARGIN_PX, height, GROUND);
-        header.draw(&mut canvas, MARGIN_PX, MARGIN_PX);
+        let warning_top = bar_top + if has_bar { bar::height(look) + look.px(4) } else { 0 };
+        let footer_top = warning_top + spaced(warning.height(), look.px(4));
+        let height = footer_top + footer.height() + margin;
+        let mut canvas = Drawing::new(look, look.width(), height);
+        header.draw(&mut canvas, margin, margin);
         for (at, &index) in shown.iter().enumerate() {
-            let left = MARGIN_PX + (at % columns) as u32 * (tile + GAP_PX);
+            let left = margin + (at % columns) as u32 * (tile + gap);
             let top = grid_top + (at / columns) as u32 * row_px;
-            let border = if self.is_warned(index) { AMBER } else { FRAME };
-            self.draw_tile(&mut canvas, index, cell as u32, (left, top), border);
-            labels[at].draw(&mut canvas, left, top + tile + 4);
+            let warned = self.is_warned(index);
+            let border = if warned { look.palette.warning } else { look.palette.frame };
+            // A warning is a wider frame.
+            let edge = look.px(if warned { 3 } else { 1 }).max(1);
+            self.draw_tile(&mut canvas, index, cell, [left, top, tile, edge], border);
+            labels[at].draw(&mut canvas, left, top + tile + look.px(3));
         }
         if let CommonOrOwn::Common(scale) = &self.scale {
-            draw_bar(&mut canvas, scale, (MARGIN_PX, bar_top), inner.min(BAR_PX));
+            draw_bar(&mut canvas, look, scale, (margin, bar_top), inner.min(look.px(BAR)));
         }
-        warning.draw(&mut canvas, MARGIN_PX, warning_top);
-        footer.draw(&mut canvas, MARGIN_PX, footer_top);
+        warning.draw(&mut canvas, margin, warning_top);
+        footer.draw(&mut canvas, margin, footer_top);
         canvas
     }
 
     fn warning(&self) -> String {
         match self.warned.len() {
             0 => String::new(),
-            count => format!("{count} of {} with warnings: numbers in amber", self.count()),
+            count => format!("{count} of {} with warnings: wide frames", self.count()),
         }
     }
 
     fn draw_tile(
         &self,
-        canvas: &mut RgbImage,
+        canvas: &mut Drawing,
         index: usize,
         cell: u32,
-        (left, top): (u32, u32),
-        border: Rgb<u8>,
+        [left, top, tile, edge]: [u32; 4],
+        border: Colour,
     ) {
-        let (scale, tile) = (self.scale_of(index), cell * self.side as u32);
-        for y in 0..tile + 2 {
-            for x in 0..tile + 2 {
-                canvas.put_pixel(left + x - 1, top + y - 1, border);
-            }
-        }
-        let image = self.image(index);
-        for y in 0..tile {
-            for x in 0..tile {
-                let at = (y / cell) as usize * self.side + (x / cell) as usize;
-                let level = to_level(scale.level(image[at]));
-                canvas.put_pixel(left + x, top + y, Rgb([level; 3]));
-            }
-        }
+        canvas.rect([left - edge, top - edge, tile + 2 * edge, tile + 2 * edge], border);
+        let scale = self.scale_of(index);
+        let levels = self.image(index).iter().map(|&v| to_level(scale.level(v))).collect();
+        let (at, columns) = ([left, top, tile, tile], self.side as u32);
+        let smooth = cell * columns != tile;
+        canvas.shapes.push(Shape::Image { at, columns, levels, smooth });
     }
 }
-
-const LABEL: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 16.0, line_px: 20, colour: MIDDLE };
-const WARNED: fn() -> Style = || Style { colour: AMBER, ..LABEL() };
 
 /// At most `most` of `count` indices, evenly from the first to the last.
 pub(super) fn evenly(count: usize, most: usize) -> Vec<usize> {
@@ -278,14 +286,10 @@ mod tests {
             let values: Vec<f32> = (0..count * 16)
                 .map(|p| gain * (1.0 + (p / 16) as f32).powi(3) * ((p % 16) as f32))
                 .collect();
-            let canvas = sheet(&header, &values, 4).render();
-            let (width, height) = canvas.dimensions();
-            let lean = 3;
-            for (x, y, pixel) in canvas.enumerate_pixels() {
-                let inside = (MARGIN_PX - lean..width - MARGIN_PX + lean).contains(&x)
-                    && (MARGIN_PX - lean..height - MARGIN_PX + lean).contains(&y);
-                prop_assert!(inside || *pixel == GROUND, "{} {} of {} x {}", x, y, width, height);
-            }
+            let look = FigureStyle::Column.look();
+            let drawing = sheet(&header, &values, 4).draw(&look);
+            prop_assert!(drawing.beyond(look.px(MARGIN)).is_none(), "{:?}", drawing.beyond(look.px(MARGIN)));
+            prop_assert!(drawing.overlapping().is_none(), "{:?}", drawing.overlapping());
         }
 
         #[test]
@@ -329,12 +333,27 @@ mod tests {
     #[test]
     fn pixels_of_tiles_are_square_and_warned_images_are_marked() {
         let values: Vec<f32> = (0..16).map(|p| p as f32).collect();
-        let canvas = sheet("", &values, 4).with_warned(vec![0]).render();
-        assert_eq!(*canvas.get_pixel(MARGIN_PX - 1, MARGIN_PX), AMBER);
-        let cell = FEW_TILE_PX as u32 / 4;
-        for (dx, dy, level) in [(0, 0, 0), (cell - 1, cell - 1, 0), (4 * cell - 1, 3 * cell, 255)] {
-            let found = *canvas.get_pixel(MARGIN_PX + dx, MARGIN_PX + dy);
-            assert_eq!(found, Rgb([level; 3]), "{dx} {dy}");
-        }
+        let look = FigureStyle::Paper.look();
+        let drawing = sheet("", &values, 4).with_warned(vec![0]).draw(&look);
+        let tile = drawing.shapes.iter().find_map(|shape| match shape {
+            Shape::Image { at, columns: 4, levels, smooth: false } => Some((*at, levels.clone())),
+            _ => None,
+        });
+        let ([left, top, wide, high], levels) = tile.unwrap();
+        assert!(wide == high && wide.is_multiple_of(4), "{wide} x {high}");
+        assert_eq!((levels[0], levels[15]), (0, 255));
+        let canvas = drawing.raster();
+        let warned = image::Rgb(look.palette.warning);
+        assert_eq!(*canvas.get_pixel(left - 1, top), warned);
+        assert_ne!(warned.0, look.palette.frame);
+    }
+
+    #[test]
+    fn a_sheet_of_large_images_shows_them_smaller() {
+        let values = vec![0.5; 2 * 700 * 700];
+        let drawing = sheet("", &values, 700).draw(&FigureStyle::Column.look());
+        assert!(drawing.shapes.iter().any(|shape| {
+            matches!(shape, Shape::Image { at, smooth: true, .. } if at[2] < 700)
+        }));
     }
 }

@@ -1,57 +1,47 @@
 //! The line of provenance below a picture.
 
-use super::text::{Block, Font, Style};
-use super::{DIM, GROUND};
-use crate::files::image::encode_rgb;
+use super::drawing::Drawing;
+use super::look::Look;
+use super::text::{Block, Style};
 use crate::provenance::Provenance;
-use image::{RgbImage, imageops};
 
-/// The words below the images.
-pub(super) const FOOTER: fn() -> Style =
-    || Style { font: Font::sans(), size_px: 18.0, line_px: 24, colour: DIM };
-
-const LEFT_PX: u32 = 36;
-const BELOW_PX: u32 = 16;
-
-/// The picture with its provenance in words below it.
-pub(super) fn signed(picture: &RgbImage, provenance: &Provenance) -> RgbImage {
-    let (width, height) = picture.dimensions();
+/// The drawing with its provenance in words below it.
+pub(super) fn signed(drawing: Drawing, look: &Look, provenance: &Provenance) -> Drawing {
+    let (width, height) = drawing.size();
+    let left = look.px(MARGIN).min(width);
     let line = provenance.to_string();
-    let words = Block::new(FOOTER, [line.as_str()], width.saturating_sub(2 * LEFT_PX).max(1));
-    let mut canvas = RgbImage::from_pixel(width, height + words.height() + BELOW_PX, GROUND);
-    imageops::replace(&mut canvas, picture, 0, 0);
-    words.draw(&mut canvas, LEFT_PX.min(width), height);
-    canvas
+    let wide = width.saturating_sub(2 * left).max(1);
+    let words = Block::new(Style::faint(look), [line.as_str()], wide);
+    let mut whole = Drawing::new(look, width, height + words.height() + look.px(6));
+    whole.place(drawing, 0, 0);
+    words.draw(&mut whole, left, height);
+    whole
 }
 
-/// The bytes of a PNG of a chart, or of several pictures, with the provenance in words below it and
-/// in its text chunks.
-///
-/// # Panics
-/// If the picture has no pixel.
-#[must_use]
-pub fn signed_png(picture: &RgbImage, provenance: &Provenance) -> Vec<u8> {
-    encode_rgb(&signed(picture, provenance), provenance)
-}
+/// Blank around all pictures, in sixteenths of the text's size.
+pub(super) const MARGIN: u32 = 10;
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::{Axis, Chart};
+    use crate::picture::{Axis, Chart, Figure, FigureStyle};
     use crate::testing::provenance;
+    use image::{Rgb, imageops};
 
     #[test]
     fn a_picture_stays_as_it_is_above_its_line_of_provenance() {
         let axis = |name| Axis::of(name, vec![0.0, 1.0], false);
         let (header, footer) = (String::new(), String::new());
         let chart = Chart { header, x: axis("x"), y: axis("y"), lines: Vec::new(), footer };
-        let picture = chart.render();
-        let signed = signed(&picture, &provenance());
-        let (width, height) = picture.dimensions();
+        let look = FigureStyle::Paper.look();
+        let drawing = Figure::from(chart).draw(&look);
+        let (picture, (width, height)) = (drawing.raster(), drawing.size());
+        let signed = signed(drawing, &look, &provenance()).raster();
         assert!(signed.width() == width && signed.height() > height);
         let above = imageops::crop_imm(&signed, 0, 0, width, height).to_image();
         assert_eq!(above, picture);
-        let bright = signed.rows().skip(height as usize).flatten().filter(|p| **p != GROUND);
-        assert!(bright.count() > 500);
+        let ground = Rgb(look.palette.ground);
+        let inked = signed.rows().skip(height as usize).flatten().filter(|p| **p != ground);
+        assert!(inked.count() > 500);
     }
 }

@@ -15,7 +15,7 @@ fn a_picture_with_labels_is_read_as_the_image_in_it() {
     let values: Vec<f32> = (0..1024).map(|p| p as f32 / 1023.0).collect();
     let written = |range, unit| {
         let panel = Panel { range, ..Panel::square("image", 32, &values, unit) };
-        read(&SideBySide::from(panel).png(&provenance())).unwrap()
+        read(&Figure::Images(panel.into()).png(&FigureStyle::Paper.look(), &provenance())).unwrap()
     };
     let found = written(Range::Unit, Unit::OfWhite);
     assert_eq!(found.size_px, 32);
@@ -35,9 +35,11 @@ fn labels_are_never_read_as_an_image() {
     let one = || Panel::square("image", 32, &values, Unit::OfWhite);
     let (header, footer) = (String::new(), String::new());
     let two = SideBySide { header, panels: vec![one(), one()], footer };
-    let told = read(&two.png(&provenance())).unwrap_err().to_string();
+    let told = read(&Figure::Images(two).png(&FigureStyle::Paper.look(), &provenance()))
+        .unwrap_err()
+        .to_string();
     assert!(told.contains("a picture of 2 images with labels, expected one image"), "{told}");
     let sheet = Sheet::new(String::new(), 32, vec![&values; 3], Unit::OfWhite);
-    let told = read(&sheet.png(&provenance())).unwrap_err().to_string();
+    let told = read(&sheet.png(&FigureStyle::Paper.look(), &provenance())).unwrap_err().to_string();
     assert!(told.contains("a picture of 3 images"), "{told}");
 }

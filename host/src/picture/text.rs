@@ -1,12 +1,12 @@
-//! Measures, wraps and draws text in the embedded fonts.
+//! Measures, wraps and places text in the embedded font.
 //!
 //! # Invariant
 //! A line from [`Style::wrap`] is at most as wide as requested
-//! (`tests::no_line_is_wider_than_asked_and_no_character_is_lost`). [`Style::draw`] paints at most
-//! the width that [`Style::width`] returns, except for the anti-aliasing of the last glyph.
+//! (`tests::no_line_is_wider_than_asked_and_no_character_is_lost`).
 
-use ab_glyph::{Font as _, FontRef, ScaleFont as _, point};
-use image::{Rgb, RgbImage};
+use super::drawing::{Drawing, Shape};
+use super::look::{Colour, Look};
+use ab_glyph::{Font as _, FontRef, GlyphId, ScaleFont as _};
 use std::sync::LazyLock;
 
 static SANS: LazyLock<FontRef<'static>> =
@@ -23,39 +23,83 @@ fn parse(bytes: &'static [u8]) -> FontRef<'static> {
 pub(super) struct Font;
 
 impl Font {
-    /// Ubuntu Light, proportional: titles and running text.
+    /// Ubuntu Light, proportional: all text of pictures.
     pub(super) fn sans() -> &'static FontRef<'static> {
         &SANS
     }
 
-    /// Hack, fixed width: figures in columns.
+    /// Hack, fixed width: a typeface of scenes.
     pub(super) fn mono() -> &'static FontRef<'static> {
         &MONO
     }
 }
 
-/// A font with a size and a colour.
+/// The height from descent to ascent of a font of this size.
+pub(super) fn height_of(size: f32) -> f32 {
+    let font = Font::sans();
+    size * font.height_unscaled() / font.units_per_em().unwrap_or(1000.0)
+}
+
+/// The letters of a line with their glyphs, and how far each is moved from the one before.
+pub(super) fn placed_glyphs(text: &str, size: f32) -> impl Iterator<Item = (char, GlyphId, f32)> {
+    let font = Font::sans().as_scaled(height_of(size));
+    let mut previous = None;
+    text.chars().map(move |letter| {
+        let id = font.glyph_id(letter);
+        let kern = previous.replace(id).map_or(0.0, |left| font.kern(left, id));
+        (letter, id, kern)
+    })
+}
+
+/// Width of a line of text in a font of this size.
+pub(super) fn width(text: &str, size: f64) -> f32 {
+    let font = Font::sans().as_scaled(height_of(size as f32));
+    placed_glyphs(text, size as f32).map(|(_, id, kern)| kern + font.h_advance(id)).sum()
+}
+
+/// A size and a colour of text.
 #[derive(Clone, Copy)]
 pub(super) struct Style {
-    pub(super) font: &'static FontRef<'static>,
-    /// Height from descent to ascent.
-    pub(super) size_px: f32,
+    /// The size of the font, in pixels.
+    pub(super) size: f64,
     pub(super) line_px: u32,
-    pub(super) colour: Rgb<u8>,
+    pub(super) colour: Colour,
 }
 
 impl Style {
+    fn of(look: &Look, sixteenths: u32, colour: Colour) -> Self {
+        let size = f64::from(sixteenths) / 16.0 * look.em();
+        Self { size, line_px: (1.3 * size).ceil() as u32, colour }
+    }
+
+    /// The header of a picture.
+    pub(super) fn header(look: &Look) -> Self {
+        Self::of(look, 20, look.palette.strong)
+    }
+
+    /// The title of an image or of a chart.
+    pub(super) fn title(look: &Look) -> Self {
+        Self::of(look, 17, look.palette.strong)
+    }
+
+    /// Running text.
+    pub(super) fn plain(look: &Look) -> Self {
+        Self::of(look, 16, look.palette.plain)
+    }
+
+    /// The source.
+    pub(super) fn faint(look: &Look) -> Self {
+        Self::of(look, 16, look.palette.faint)
+    }
+
+    /// A warning.
+    pub(super) fn warning(look: &Look) -> Self {
+        Self::of(look, 16, look.palette.warning)
+    }
+
     /// Width of a line of text in pixels.
     pub(super) fn width(&self, text: &str) -> f32 {
-        let font = self.font.as_scaled(self.size_px);
-        let mut previous = None;
-        text.chars()
-            .map(|character| {
-                let id = font.glyph_id(character);
-                let kern = previous.replace(id).map_or(0.0, |left| font.kern(left, id));
-                kern + font.h_advance(id)
-            })
-            .sum()
+        width(text, self.size)
     }
 
     /// Breaks text into lines of at most `width_px`: between words if possible, else inside a word
@@ -92,29 +136,18 @@ impl Style {
         lines
     }
 
-    /// Draws a line of text with the top left corner of its box at `(x, y)`. Parts outside the
-    /// canvas are cut.
-    pub(super) fn draw(&self, canvas: &mut RgbImage, text: &str, x: f32, y: f32) {
-        let font = self.font.as_scaled(self.size_px);
+    /// Draws a line of text with the top left corner of its box at `(x, y)`.
+    pub(super) fn draw(&self, canvas: &mut Drawing, text: &str, x: f32, y: f32) {
+        let height = height_of(self.size as f32);
+        let font = Font::sans().as_scaled(height);
         let baseline = (y + (self.line_px as f32 - font.height()) / 2.0 + font.ascent()).round();
-        let mut pen = x;
-        let mut previous = None;
-        for character in text.chars() {
-            let id = font.glyph_id(character);
-            pen += previous.replace(id).map_or(0.0, |left| font.kern(left, id));
-            let glyph = id.with_scale_and_position(self.size_px, point(pen, baseline));
-            pen += font.h_advance(id);
-            let Some(outlined) = font.outline_glyph(glyph) else { continue };
-            let bounds = outlined.px_bounds();
-            outlined.draw(|dx, dy, coverage| {
-                let (x, y) =
-                    (bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy));
-                let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
-                if let Some(pixel) = canvas.get_pixel_mut_checked(x, y) {
-                    blend(pixel, self.colour, coverage);
-                }
-            });
-        }
+        canvas.shapes.push(Shape::Text {
+            x: f64::from(x),
+            baseline: f64::from(baseline),
+            size: self.size,
+            colour: self.colour,
+            text: text.to_owned(),
+        });
     }
 }
 
@@ -127,11 +160,10 @@ pub(super) struct Block {
 impl Block {
     /// These texts below each other, each in lines of at most `width_px`. An empty text has no line.
     pub(super) fn new<'a>(
-        style: fn() -> Style,
+        style: Style,
         texts: impl IntoIterator<Item = &'a str>,
         width_px: u32,
     ) -> Self {
-        let style = style();
         let lines = texts.into_iter().flat_map(|text| style.wrap(text, width_px as f32)).collect();
         Self { style, lines }
     }
@@ -150,19 +182,11 @@ impl Block {
         self.lines.iter().map(|line| self.style.width(line)).fold(0.0, f32::max)
     }
 
-    pub(super) fn draw(&self, canvas: &mut RgbImage, left: u32, top: u32) {
+    pub(super) fn draw(&self, canvas: &mut Drawing, left: u32, top: u32) {
         for (k, line) in self.lines.iter().enumerate() {
             let y = top + k as u32 * self.style.line_px;
             self.style.draw(canvas, line, left as f32, y as f32);
         }
-    }
-}
-
-fn blend(ground: &mut Rgb<u8>, ink: Rgb<u8>, coverage: f32) {
-    for (ground, ink) in ground.0.iter_mut().zip(ink.0) {
-        let mixed =
-            f32::from(*ground) + (f32::from(ink) - f32::from(*ground)) * coverage.clamp(0.0, 1.0);
-        *ground = mixed.round() as u8;
     }
 }
 
@@ -172,7 +196,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn style() -> Style {
-        Style { font: Font::sans(), size_px: 20.0, line_px: 24, colour: Rgb([255; 3]) }
+        Style { size: 20.0, line_px: 24, colour: [255; 3] }
     }
 
     proptest! {

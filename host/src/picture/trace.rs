@@ -30,7 +30,7 @@ pub fn of_trace(found: &Found, footer: String) -> Chart {
     let mut lines = vec![line("samples", 0, false, samples)];
     for (name, colour, edges) in [
         ("the trigger rises: a pattern begins", 2, &first.edges),
-        ("the trigger rises too early: left out", 5, &first.extra),
+        ("the trigger rises too early: left out", 3, &first.extra),
     ] {
         if !edges.is_empty() {
             lines.push(line(name, colour, true, upright(edges)));

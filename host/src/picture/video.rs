@@ -4,13 +4,15 @@
 //! The video has a frame for every image, or evenly chosen ones, and each frame names its image
 //! (`tests::a_video_decodes_to_as_many_frames_as_it_has_images`). All frames have one size.
 
+use super::drawing::Drawing;
 use super::layout::{Panel, SideBySide};
+use super::look::{FigureStyle, Look};
 use super::scale::{Range, Unit};
 use super::sheet::{Sheet, evenly};
 use super::signature::signed;
 use crate::files::image::sign;
 use crate::provenance::Provenance;
-use image::{GenericImageView, RgbImage, imageops};
+use image::{GenericImageView, RgbImage};
 use nirspi_recon::Image;
 use rayon::prelude::*;
 
@@ -33,19 +35,24 @@ pub(super) struct Video {
 ///
 /// # Panics
 /// If there is no image.
-pub(super) fn beside(sheet: &Sheet<'_>, provenance: &Provenance) -> Video {
-    encode(sheet, MOST_BESIDE, provenance)
+pub(super) fn beside(sheet: &Sheet<'_>, style: FigureStyle, provenance: &Provenance) -> Video {
+    encode(sheet, MOST_BESIDE, style, provenance)
 }
 
-fn encode(sheet: &Sheet<'_>, most: usize, provenance: &Provenance) -> Video {
+fn encode(sheet: &Sheet<'_>, most: usize, style: FigureStyle, provenance: &Provenance) -> Video {
     let shown = evenly(sheet.count(), most);
-    let pictures: Vec<SideBySide> = shown.iter().map(|&index| frame(sheet, index)).collect();
+    let look = style.on_screen();
+    let pictures: Vec<Drawing> =
+        shown.iter().map(|&index| drawn(&frame(sheet, index), &look)).collect();
     // The text below an image may be longer than that of another.
-    let height = pictures.iter().map(SideBySide::height).max().unwrap_or(1);
+    let height = pictures.iter().map(|picture| picture.height).max().unwrap_or(1);
     let mut bytes = Vec::new();
     let encoded = (|| {
-        let drawn = |picture: &SideBySide| signed(&padded(picture.render(), height), provenance);
-        let together = |some: &[SideBySide]| some.par_iter().map(drawn).collect::<Vec<_>>();
+        let drawn = |picture: &Drawing| {
+            let padded = Drawing { height, ..picture.clone() };
+            signed(padded, &look, provenance).raster()
+        };
+        let together = |some: &[Drawing]| some.par_iter().map(drawn).collect::<Vec<_>>();
         let mut pictures = pictures.chunks(TOGETHER).flat_map(together);
         let mut before = pictures.next().unwrap_or_else(|| RgbImage::new(1, 1));
         let mut encoder = png::Encoder::new(&mut bytes, before.width(), before.height());
@@ -79,7 +86,8 @@ fn encode(sheet: &Sheet<'_>, most: usize, provenance: &Provenance) -> Video {
 pub fn of_images(header: &str, images: &[Image], unit: Unit, provenance: &Provenance) -> Vec<u8> {
     let side = images.first().map_or(1, |image| image.side().pixels());
     let values = images.iter().map(Image::pixels).collect();
-    encode(&Sheet::new(header.to_owned(), side, values, unit), MOST, provenance).bytes
+    let sheet = Sheet::new(header.to_owned(), side, values, unit);
+    encode(&sheet, MOST, FigureStyle::Paper, provenance).bytes
 }
 
 fn frame(sheet: &Sheet<'_>, index: usize) -> SideBySide {
@@ -94,13 +102,8 @@ fn frame(sheet: &Sheet<'_>, index: usize) -> SideBySide {
     .into()
 }
 
-fn padded(picture: RgbImage, height: u32) -> RgbImage {
-    if picture.height() == height {
-        return picture;
-    }
-    let mut canvas = RgbImage::from_pixel(picture.width(), height, super::GROUND);
-    imageops::replace(&mut canvas, &picture, 0, 0);
-    canvas
+fn drawn(picture: &SideBySide, look: &Look) -> Drawing {
+    picture.draw(look, picture.width(look)).0
 }
 
 /// The smallest part that holds all changes, at least a pixel: left, top, width, height.
@@ -139,14 +142,14 @@ mod tests {
             .collect();
         let images: Vec<&[f32]> = images.iter().map(Vec::as_slice).collect();
         let sheet = Sheet::new(String::new(), 8, images, Unit::AdcCounts);
-        let video = encode(&sheet, MOST, &provenance());
+        let video = encode(&sheet, MOST, FigureStyle::Paper, &provenance());
         assert_eq!(video.frames, 4);
         let frames = PngDecoder::new(Cursor::new(&video.bytes)).unwrap().apng().unwrap();
         let frames = frames.into_frames().collect_frames().unwrap();
         assert_eq!(frames.len(), 4);
         for (index, found) in frames.into_iter().enumerate() {
             assert_eq!(found.delay().numer_denom_ms(), (100, 1));
-            let wanted = frame(&sheet, index).render();
+            let wanted = drawn(&frame(&sheet, index), &FigureStyle::Paper.on_screen()).raster();
             let found = DynamicImage::from(found.into_buffer()).to_rgb8();
             let (width, height) = wanted.dimensions();
             let part = found.view(0, 0, width, height).to_image();
@@ -158,7 +161,7 @@ mod tests {
     fn a_video_of_very_many_images_says_how_many_it_leaves_out() {
         assert_eq!(evenly(20_000, MOST).len(), 1000);
         let many = Sheet::new(String::new(), 2, vec![&[0.0; 4]; 101], Unit::AdcCounts);
-        assert_eq!(beside(&many, &provenance()).frames, 100);
+        assert_eq!(beside(&many, FigureStyle::Paper, &provenance()).frames, 100);
         let one = vec![0.0; 4];
         let sheet = Sheet::new(String::new(), 2, vec![&one; 1234], Unit::AdcCounts);
         assert_eq!(frame(&sheet, 17).panels[0].title, "frame 17, of 0 to 1233");

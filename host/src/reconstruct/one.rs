@@ -6,7 +6,7 @@ use crate::account::LossCounters;
 use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
 use crate::imaging::{FrameReport, FramesError, MethodReport, enhance_frames};
-use crate::picture::{Pictures, Unit};
+use crate::picture::{FigureStyle, Pictures, Unit};
 use crate::provenance::Made;
 use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
@@ -30,6 +30,8 @@ pub struct OneImage<'r> {
     pub out: &'r Path,
     /// The program, for the provenance of the results.
     pub made: &'r Made,
+    /// What the pictures are made for.
+    pub figure: FigureStyle,
 }
 
 /// Readings that were lost.
@@ -208,7 +210,13 @@ pub fn one_image(
     });
     let provenance = source.taken.made(request.made);
     let report = OneReport {
-        pictures: Pictures::of_image(&image, unit, sharp.as_deref().zip(short), &provenance),
+        pictures: Pictures::of_image(
+            &image,
+            unit,
+            sharp.as_deref().zip(short),
+            request.figure,
+            &provenance,
+        ),
         input: request.input.to_owned(),
         n: side,
         measurements: source.measurements.rows().len(),

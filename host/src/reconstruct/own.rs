@@ -3,7 +3,7 @@
 use super::{SolverError, check_finite, not_read_words, read_atoms, write_image};
 use crate::files::FileError;
 use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain};
-use crate::picture::{Pictures, Unit};
+use crate::picture::{FigureStyle, Pictures, Unit};
 use crate::provenance::{Made, Taken};
 use crate::stage_times::StageTimes;
 use nirspi_recon::Sampling;
@@ -35,6 +35,8 @@ pub struct OwnImage<'r> {
     pub out: &'r Path,
     /// The program, for the provenance of the results.
     pub made: &'r Made,
+    /// What the pictures are made for.
+    pub figure: FigureStyle,
 }
 
 /// The report of such an image.
@@ -161,7 +163,13 @@ pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnRepo
         relative_residual: found.residual,
         not_read,
         notes,
-        pictures: Pictures::of_image(&found.image, Unit::Readings, None, &provenance),
+        pictures: Pictures::of_image(
+            &found.image,
+            Unit::Readings,
+            None,
+            request.figure,
+            &provenance,
+        ),
         stage_ms: times,
     };
     write_image(request.out, &found.image, None, None, &report.pictures, &report)?;

@@ -4,7 +4,7 @@ use super::{FileImage, ManyImages, Skipped};
 use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
 use crate::imaging::{Enhance, FrameReport, FramesError, MethodReport, enhance_frames_by};
-use crate::picture::{Pictures, Unit};
+use crate::picture::{FigureStyle, Pictures, Unit};
 use crate::provenance::Made;
 use crate::source::OutlierReport;
 use crate::stage_times::StageTimes;
@@ -30,6 +30,8 @@ pub struct StackFolder<'r> {
     pub out: &'r Path,
     /// The program, for the provenance of the results.
     pub made: &'r Made,
+    /// What the pictures are made for.
+    pub figure: FigureStyle,
 }
 
 /// The report of a stack.
@@ -144,7 +146,7 @@ pub fn write_stack(
     let warned = (0..frames.len()).filter(|&at| doubted(&frames[at])).collect();
     let pictures = times.time("pictures", || {
         let sharp = sharp.as_deref().map(|sharp| (sharp, warned));
-        Pictures::of_video(&folder.named, &pixels, unit, sharp, &provenance)
+        Pictures::of_video(&folder.named, &pixels, unit, sharp, folder.figure, &provenance)
     });
     let mut out = OutputDir::create(folder.out)?;
     times.time("write", || -> Result<(), FileError> {

@@ -34,7 +34,7 @@ pub use look::{Bench, Calibrated, Look, LookError, Seen, SeenImage, SeenPicture}
 pub use model::{CameraFileError, read_camera_model};
 pub use nirspi_optics::CameraModel;
 pub use optics::{VirtualOptics, VirtualOpticsError};
-pub use panels::{Panels, SCENE_PX};
+pub use panels::{Panels, SCENE_PX, Shown};
 pub use precomputed::PrecomputedFpga;
 pub use server::{ServeOptions, ServerEvent, serve};
 pub use shot::{

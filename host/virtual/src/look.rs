@@ -20,7 +20,7 @@ use nirspi::calibration::FlatField;
 use nirspi::capture::{Progress, StopCause};
 use nirspi::exposure::{Exposure, Length, Light, LightError};
 use nirspi::imaging::{KnownReadings, MethodReport, share_of_white};
-use nirspi::picture::{Panel, SideBySide, Unit};
+use nirspi::picture::{Figure, FigureStyle, Panel, Unit};
 use nirspi::provenance::{Made, Provenance, Taken};
 use nirspi::response::Settling;
 use nirspi::scene::{SceneError, SceneSource};
@@ -284,7 +284,7 @@ impl SeenPicture {
     pub fn png(&self) -> Vec<u8> {
         let panel =
             Panel::square("enhanced (simulated)", deblur::SIDE, &self.pixels, Unit::OfWhite);
-        SideBySide::from(panel).png(&self.provenance)
+        Figure::Images(panel.into()).png(&FigureStyle::Paper.look(), &self.provenance)
     }
 }
 

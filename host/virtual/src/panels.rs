@@ -9,14 +9,70 @@
 use super::{Stages, VirtualOptics};
 use nirspi::capture::Capture;
 use nirspi::imaging::{MethodReport, Quality};
-use nirspi::picture::{Panel, Pictures, Range, SideBySide, Unit};
+use nirspi::picture::{FigureStyle, Panel, Pictures, Range, SideBySide, Unit};
 use nirspi::provenance::Provenance;
 use nirspi::scene::SceneMap;
 use nirspi_nets::{deblur, fusion};
 use nirspi_recon::Image;
+use std::str::FromStr;
 
 /// Edge of the scene in its panel.
 pub const SCENE_PX: usize = 256;
+
+/// An image of `side_by_side.png`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shown {
+    /// The scene.
+    Scene,
+    /// What a perfect camera with as many LEDs would show.
+    Truth,
+    /// The plain inverse transform.
+    Raw,
+    /// The result of the method.
+    Result,
+    /// The result, enlarged by a network.
+    Enlarged,
+    /// The enlarged image, deblurred.
+    Deblurred,
+    /// Where the deblurred image is unsure.
+    Uncertainty,
+}
+
+impl Shown {
+    /// All images, in order.
+    pub const ALL: [Self; 7] = [
+        Self::Scene,
+        Self::Truth,
+        Self::Raw,
+        Self::Result,
+        Self::Enlarged,
+        Self::Deblurred,
+        Self::Uncertainty,
+    ];
+
+    /// The name, as users write it, and what it is.
+    #[must_use]
+    pub fn named(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Scene => ("scene", "the scene"),
+            Self::Truth => ("limit", "what 32 x 32 LEDs can show"),
+            Self::Raw => ("plain", "the plain inverse transform"),
+            Self::Result => ("result", "the image by --method"),
+            Self::Enlarged => ("enlarged", "the result, enlarged by a network"),
+            Self::Deblurred => ("deblurred", "the enlarged image, deblurred"),
+            Self::Uncertainty => ("uncertainty", "where the deblurred image is unsure"),
+        }
+    }
+}
+
+impl FromStr for Shown {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|shown| shown.named().0 == name);
+        found.ok_or_else(|| format!("{name}: no such panel"))
+    }
+}
 
 /// What the panels show.
 #[derive(Debug)]
@@ -48,12 +104,22 @@ pub struct Panels<'a> {
 }
 
 impl Panels<'_> {
-    /// `side_by_side.png`, and each image from the raw one on as a picture of its own.
+    /// `side_by_side.png` of these panels, with SVG and PDF beside it, and each image from the raw
+    /// one on as a picture of its own.
     #[must_use]
-    pub fn pictures(&self, provenance: &Provenance) -> Pictures {
-        let mut pictures = Pictures::new(provenance);
+    pub fn pictures(
+        &self,
+        shown: &[Shown],
+        style: FigureStyle,
+        provenance: &Provenance,
+    ) -> Pictures {
+        let mut pictures = Pictures::new(style, provenance);
         let mut all = self.side_by_side();
-        pictures.add("side_by_side.png", &all);
+        let of = |shown: &Shown| all.panels.get(*shown as usize).cloned();
+        let panels: Vec<Panel> = shown.iter().filter_map(of).collect();
+        // Without intervals there is no last panel.
+        let panels = if panels.is_empty() { all.panels.clone() } else { panels };
+        pictures.add("side_by_side.png", SideBySide { panels, ..all.clone() });
         all.panels.push(self.panel("upscaled", deblur::SIDE, &self.stages.upscaled, Vec::new()));
         let interval = self.stages.half_width.as_ref().map(|_| "interval");
         let names: Vec<&str> = ["raw", "reconstruction", "fused", "deblurred"]

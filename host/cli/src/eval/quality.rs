@@ -4,10 +4,9 @@
 use crate::print;
 use crate::progress::Progress;
 use crate::provenance;
-use crate::report::ReportArgs;
+use crate::report::{FigureArgs, ReportArgs};
 use anyhow::Result;
 use nirspi::files::output::OutputDir;
-use nirspi::picture::signed_png;
 use nirspi_eval::quality::{Condition, Measured, Report, Settings, Study, Version};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -57,6 +56,8 @@ pub struct Args {
     #[arg(long, value_name = "DIR", default_value = "quality")]
     out: PathBuf,
     #[command(flatten)]
+    figure: FigureArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -78,8 +79,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     drop(bar);
     let provenance = provenance::simulated();
     let mut out = OutputDir::create(&args.out)?;
-    for (name, picture) in &pictures {
-        out.write(name, &signed_png(picture, &provenance))?;
+    for (name, figure) in &pictures {
+        figure.write(&mut out, name, args.figure.figure, &provenance)?;
     }
     out.write("quality.json", provenance.sign(&report)?.as_bytes())?;
     out.commit()?;

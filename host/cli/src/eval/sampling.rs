@@ -3,12 +3,11 @@
 use crate::camera::parse_order;
 use crate::progress::Progress;
 use crate::provenance::made;
-use crate::report::ReportArgs;
+use crate::report::{FigureArgs, ReportArgs};
 use crate::source::SourceArgs;
 use crate::{print, refused};
 use anyhow::{Context, Result};
 use nirspi::files::output::OutputDir;
-use nirspi::picture::signed_png;
 use nirspi_eval::sampling::{JudgedBy, RECORDED, Study, default_orders};
 use nirspi_recon::Sampling;
 use std::path::PathBuf;
@@ -17,8 +16,9 @@ use std::process::ExitCode;
 /// Compare orders, bases and methods at partial sampling, on measurements of a full sweep
 ///
 /// An independent measurement of the scene judges the images: the other half of a recording's frames, or --against. Without
-/// either, the image of all patterns of the same readings does, which has their noise. The command writes sampling.md (tables), sampling.json (every number) and
-/// sampling.png (each order's gain over zero filling, and the best images).
+/// either, the image of all patterns of the same readings does, which has their noise. The command writes sampling.md (tables), sampling.json (every number),
+/// sampling.png (each order's gain over zero filling, and the best image at each share) and sampling_images.png (the best images
+/// of each order).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval sampling capture.mcap --out sampling/\n\
@@ -38,6 +38,8 @@ pub struct Args {
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "sampling")]
     out: PathBuf,
+    #[command(flatten)]
+    figure: FigureArgs,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -77,11 +79,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut out = OutputDir::create(&args.out)?;
     out.write("sampling.md", tables.as_bytes())?;
     out.write("sampling.json", provenance.sign(&report)?.as_bytes())?;
-    out.write("sampling.png", &signed_png(&study.plot(&report), &provenance))?;
+    for (name, figure) in study.figures(&report) {
+        figure.write(&mut out, name, args.figure.figure, &provenance)?;
+    }
     out.commit()?;
     args.report.print(&report, &provenance, |_| {
         print::line(tables.trim_end())?;
         let folder = args.out.display();
-        print::line(format_args!("wrote sampling.md, sampling.json and sampling.png to {folder}"))
+        print::line(format_args!(
+            "wrote sampling.md, sampling.json, sampling.png and sampling_images.png to {folder}"
+        ))
     })
 }

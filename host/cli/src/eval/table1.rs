@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("table 1", args.repeats, "pictures");
     let report = table1(&settings, &|| bar.add(1)).map_err(refused)?;
     drop(bar);
-    let picture = || Ok(chart(&report).render());
+    let picture = || Ok(chart(&report).into());
     args.output.hand_over("table1", &report, picture, say)
 }
 

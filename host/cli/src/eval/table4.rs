@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("table 4", settings.pictures(), "pictures");
     let report = table4(&settings, &|| bar.add(1))?;
     drop(bar);
-    let picture = || Ok(chart(&report).render());
+    let picture = || Ok(chart(&report).into());
     args.output.hand_over("table4", &report, picture, say)
 }
 

@@ -27,6 +27,7 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         sampling: args.sampling,
         out: &args.out,
         made: made(),
+        figure: args.figure.figure,
     };
     let report = spinning(|| own_image(request, stages()))?;
     args.report.print(&report, report.pictures.provenance(), |report| say(args, report))

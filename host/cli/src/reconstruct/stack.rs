@@ -49,6 +49,7 @@ pub fn write(
         enhance: args.enhance.then(|| args.method.device()).transpose()?,
         out: &args.out,
         made: made(),
+        figure: args.figure.figure,
     };
     spinning(|| write_stack(&folder, images, times)).map_err(|error| match error {
         StackFolderError::Complex => Usage(error.to_string()).into(),

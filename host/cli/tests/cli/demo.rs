@@ -3,7 +3,7 @@
 use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
 
-const FILES: [&str; 20] = [
+const FILES: [&str; 22] = [
     "deblurred.npy",
     "deblurred.png",
     "frames.npy",
@@ -19,7 +19,9 @@ const FILES: [&str; 20] = [
     "report.json",
     "scene.npy",
     "scene.png",
+    "side_by_side.pdf",
     "side_by_side.png",
+    "side_by_side.svg",
     "truth.npy",
     "truth_64.npy",
     "upscaled.npy",
@@ -169,6 +171,30 @@ fn all_panels_show_one_field_on_one_scale() {
     };
     let (scene, truth) = (rows("demo/scene.npy"), rows("demo/truth_64.npy"));
     assert!((scene - truth).abs() < 0.03 && (scene - 0.40).abs() < 0.02, "{scene} {truth}");
+}
+
+#[test]
+fn figures_show_the_panels_asked_for_at_the_width_asked_for() {
+    let bench = Bench::new();
+    let demo = ["demo", "--frames", "2", "--out", "demo", "--json"];
+    let width = || {
+        let svg = std::fs::read_to_string(bench.path("demo/side_by_side.svg")).unwrap();
+        svg.split("width=\"").nth(1).unwrap().split("mm").next().unwrap().parse::<f64>().unwrap()
+    };
+    let of = |more: &[&str]| {
+        let report = bench.run(&[&demo[..], more].concat()).succeeded().json();
+        let panels = report["pictures"][0]["images"].as_array().unwrap().clone();
+        let titles: Vec<String> =
+            panels.iter().map(|panel| panel["title"].as_str().unwrap().to_owned()).collect();
+        (titles, width().round() as u32)
+    };
+    assert_eq!(of(&[]).1, 178);
+    let two = ["--panels", "deblurred,scene", "--figure", "column"];
+    assert_eq!(of(&two), (vec!["deblurred".to_owned(), "scene".to_owned()], 85));
+    let wrong = [&demo[..], &["--panels", "noise"]].concat();
+    bench.run(&wrong).failed(2, &["noise", "uncertainty"]);
+    let wrong = [&demo[..], &["--figure", "poster"]].concat();
+    bench.run(&wrong).failed(2, &["poster", "paper"]);
 }
 
 #[test]

@@ -203,7 +203,10 @@ fn no_result_replaces_its_own_input_nor_another_file_unasked() {
     deblur(&["--out", "large.npy"]).failed(1, &["large.npy: is there already"]);
     deblur(&["--out", "large.npy", "--overwrite"]).succeeded();
     deblur(&["--out", "-"]).failed(1, &["-: found no name"]);
-    assert_eq!(bench.names(), ["in.npy", "large.npy", "large.picture.png"]);
+    assert_eq!(
+        bench.names(),
+        ["in.npy", "large.npy", "large.picture.pdf", "large.picture.png", "large.picture.svg"]
+    );
 }
 
 #[test]

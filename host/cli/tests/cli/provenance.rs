@@ -44,6 +44,15 @@ fn of_npz(path: &Path) -> Provenance {
     serde_json::from_str(&text).unwrap()
 }
 
+/// The provenance of a figure: JSON in one line of its text.
+fn of_text(path: &Path) -> Provenance {
+    let text = String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned();
+    let text = text.replace("&quot;", "\"");
+    let start = text.find("{\"origin\"").unwrap_or_else(|| panic!("{}", path.display()));
+    let mut found = serde_json::Deserializer::from_str(&text[start..]).into_iter();
+    found.next().unwrap().unwrap()
+}
+
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
@@ -67,6 +76,7 @@ fn all_are_signed(bench: &Bench, folder: &str, count: usize, origin: Origin, nam
                 of_json(&what, &serde_json::from_slice(&fs::read(&file).unwrap()).unwrap())
             }
             Some("npz") => of_npz(&file),
+            Some("svg" | "csv" | "pdf") => of_text(&file),
             _ => continue,
         };
         is_signed(&what, &provenance, origin, name);
@@ -100,11 +110,11 @@ fn pictures_and_reports_of_a_recording_name_its_camera() {
         said.made.command,
         capture.join(" ").replace("capture", "nirspi capture") + " --json"
     );
-    all_are_signed(&bench, "seen", 3, SIMULATED, "capture");
+    all_are_signed(&bench, "seen", 7, SIMULATED, "capture");
 
     let reconstruct = ["reconstruct", "rec.mcap", "--json"];
     for (more, out, count) in
-        [(&["--enhance"][..], "one", 3), (&["--enhance", "--index", "all"], "video", 5)]
+        [(&["--enhance"][..], "one", 7), (&["--enhance", "--index", "all"], "video", 9)]
     {
         let arguments = [&reconstruct[..], more, &["--out", out]].concat();
         let said = says(run(&bench, &arguments), SIMULATED, "reconstruct");
@@ -145,8 +155,8 @@ fn everything_that_a_demo_writes_is_signed() {
     assert_eq!(said.taken.camera.unwrap().serial, "virtual-1");
     let pictures = files(&bench.path("demo"));
     let pictures = pictures.iter().filter(|file| file.extension().is_some_and(|e| e == "png"));
-    // The pictures, report.json and measurement.npz.
-    all_are_signed(&bench, "demo", pictures.count() + 2, SIMULATED, "demo");
+    // The pictures, the figure as SVG and PDF, report.json and measurement.npz.
+    all_are_signed(&bench, "demo", pictures.count() + 4, SIMULATED, "demo");
 }
 
 #[test]
@@ -165,7 +175,7 @@ fn enhanced_images_keep_the_origin_that_their_pictures_state() {
     };
     let said = says(deblur("signed.png", "sharp/s.png"), Origin::Measured, "deblur");
     assert_eq!(said.taken.file.as_deref(), Some("wing.npz"));
-    all_are_signed(&bench, "sharp", 2, Origin::Measured, "deblur");
+    all_are_signed(&bench, "sharp", 4, Origin::Measured, "deblur");
     let said = says(deblur("plain.npy", "p.npy"), Origin::Unknown, "deblur");
     assert_eq!(said.taken.file.as_deref(), Some("plain.npy"));
     for name in ["enhance", "dev upscale"] {
@@ -175,7 +185,7 @@ fn enhanced_images_keep_the_origin_that_their_pictures_state() {
         let arguments =
             [&words[..], &["small.npy", "--backend", "cpu", "--out", &out, "--json"]].concat();
         says(run(&bench, &arguments), Origin::Unknown, name);
-        all_are_signed(&bench, name, 1, Origin::Unknown, name);
+        all_are_signed(&bench, name, 3, Origin::Unknown, name);
     }
 }
 
@@ -189,7 +199,7 @@ fn readings_of_others_are_named_by_their_file() {
     let matrix = ["reconstruct", "dmd.npz", "--matrix", "patterns.npy", "--method", "tikhonov"];
     let said = run(&bench, &[&matrix[..], &["--out", "matrix", "--json"]].concat());
     assert_eq!(says(said, Origin::Unknown, "reconstruct").taken.file.as_deref(), Some("dmd.npz"));
-    all_are_signed(&bench, "matrix", 2, Origin::Unknown, "reconstruct");
+    all_are_signed(&bench, "matrix", 4, Origin::Unknown, "reconstruct");
 
     let d: Vec<f32> = (0..64).map(|at| ((at * 37) % 23) as f32).collect();
     let rows: Vec<f32> = (0..64).map(|at| at as f32).collect();
@@ -197,7 +207,7 @@ fn readings_of_others_are_named_by_their_file() {
     let sampling = ["eval", "sampling", "lab.npz", "--sampling", "50%", "--orders", "zig-zag"];
     let said = run(&bench, &[&sampling[..], &["--out", "study", "--json"]].concat());
     says(said, Origin::Unknown, "eval sampling");
-    all_are_signed(&bench, "study", 2, Origin::Unknown, "eval sampling");
+    all_are_signed(&bench, "study", 8, Origin::Unknown, "eval sampling");
     let tables = fs::read_to_string(bench.path("study/sampling.md")).unwrap();
     assert!(tables.contains("origin unknown, file lab.npz, nirspi "), "{tables}");
 }
@@ -211,14 +221,14 @@ fn tables_charts_and_times_are_signed() {
             &["physics", "range", "--out", "range", "--json"][..],
             "physics range",
             "range",
-            5,
+            17,
             SIMULATED,
         ),
         (
             &["eval", "table1", "--repeats", "10", "--out", "table", "--json"],
             "eval table1",
             "table",
-            2,
+            5,
             SIMULATED,
         ),
     ] {

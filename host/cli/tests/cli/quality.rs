@@ -66,7 +66,17 @@ fn every_row_is_measured_on_the_same_unseen_images() {
     let others = report["others"].as_array().unwrap();
     let disc = others.iter().find(|case| case["name"] == "disc (measured)").unwrap();
     assert!(disc["psnr_after_db"].is_null() && disc["changed"].as_f64().unwrap() > 0.0, "{disc}");
-    for name in ["blur.png", "noise.png", "steps.png", "others.png", "depth.png", "quality.json"] {
+    for name in [
+        "blur.png",
+        "blur.svg",
+        "blur.pdf",
+        "blur.csv",
+        "noise.png",
+        "steps.png",
+        "others.png",
+        "depth.png",
+        "quality.json",
+    ] {
         assert!(bench.path("quality").join(name).is_file(), "{name}");
     }
 }

@@ -112,13 +112,13 @@ fn curves_of_rain_are_written_as_pictures_and_numbers() {
     let bench = Bench::new();
     let out = ["physics", "rain", "--drops", "mono:2", "--out", "curves"];
     let text = bench.run(&out).succeeded().stdout;
-    assert!(text.contains("in a rig") && text.contains("wrote curves"), "{text}");
+    assert!(text.contains("in a rig") && text.contains("wrote figures"), "{text}");
     for name in
         ["extinction_wavelength", "albedo_size", "drop_sizes", "fall_speed", "extinction_rate"]
     {
         assert!(bench.path(&format!("curves/{name}.png")).exists(), "{name}");
         let csv = std::fs::read_to_string(bench.path(&format!("curves/{name}.csv"))).unwrap();
-        assert!(csv.starts_with("line,") && csv.lines().count() > 20, "{name}: {csv}");
+        assert!(csv.contains("\nchart,curve,") && csv.lines().count() > 20, "{name}: {csv}");
     }
     assert_eq!(bench.json("curves/rain.json")["fall"]["rig"]["height_m"], 0.25);
     bench.run(&["physics", "budget", "--out", "curves"]).failed(2, &["--out"]);

@@ -155,7 +155,7 @@ fn a_run_that_fails_leaves_older_results_alone() {
     bench.write("in.npz", &measured.npz());
     bench.run(&["reconstruct", "in.npz"]).failed(1, &["in.npz", "`y`", "inf", "[7]"]);
     assert_eq!(std::fs::read(bench.path("out/report.json")).unwrap(), before);
-    let files = ["image.npy", "image.png", "report.json", ".nirspi.json"];
+    let files = ["image.npy", "image.png", "image.svg", "image.pdf", "report.json", ".nirspi.json"];
     assert!(files.iter().all(|name| bench.path(&format!("out/{name}")).is_file()));
     assert_eq!(std::fs::read_dir(bench.path("out")).unwrap().count(), files.len());
 }

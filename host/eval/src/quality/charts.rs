@@ -6,8 +6,7 @@ use super::characters::Characters;
 use super::condition::Condition;
 use super::contenders::Method;
 use super::measure::Figures;
-use image::RgbImage;
-use nirspi::picture::{Axis, Chart, Line, below};
+use nirspi::picture::{Axis, Chart, Figure, Line};
 use nirspi_nets::classical::Method as Classical;
 
 /// The classical method in the charts over steps.
@@ -31,13 +30,13 @@ const MEASURES: [Measure; 3] = [
     },
 ];
 
-/// File names and pictures of all charts.
+/// Names and figures of all charts.
 pub fn all(
     measured: &[Figures],
     steps: &[Figures],
     characters: &Characters,
     few: &Characters,
-) -> Vec<(&'static str, RgbImage)> {
+) -> Vec<(&'static str, Figure)> {
     let Condition { sigma_px, noise } = MIDDLE;
     let whole: Vec<&Figures> = measured.iter().filter(|f| f.stack.is_none()).collect();
     let along = |of: fn(&Condition) -> f64, fixed: fn(&Condition) -> bool| {
@@ -53,7 +52,7 @@ pub fn all(
     let count = characters.len();
     vec![
         (
-            "blur.png",
+            "blur",
             column(
                 &format!("Quality against blur, noise {noise}"),
                 &linear("blur, sigma in pixels of 64 x 64", &[0.0, 1.0, 2.0, 3.0, 4.0]),
@@ -62,7 +61,7 @@ pub fn all(
             ),
         ),
         (
-            "noise.png",
+            "noise",
             column(
                 &format!("Quality against noise, blur {sigma_px} px"),
                 &linear("noise of the readings, 1 is white", &[0.0, 0.02, 0.04, 0.06, 0.08]),
@@ -71,7 +70,7 @@ pub fn all(
             ),
         ),
         (
-            "steps.png",
+            "steps",
             column(
                 &format!("Quality against steps, blur {sigma_px} px, noise {noise}"),
                 &Axis {
@@ -109,7 +108,7 @@ fn linear(name: &str, ticks: &[f64]) -> Axis {
 }
 
 /// The three charts of one axis, below each other.
-fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
+fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> Figure {
     let charts = MEASURES.map(|measure| {
         let lines: Vec<Line> = rows
             .iter()
@@ -122,14 +121,13 @@ fn column(header: &str, x: &Axis, rows: &[Row<'_>], images: usize) -> RgbImage {
             })
             .collect();
         let values = lines.iter().flat_map(|line| line.points.iter().map(|point| point.1));
-        let chart = Chart {
+        Chart {
             header: header.to_owned(),
             x: x.clone(),
             y: Axis::around(measure.name, values),
             lines,
             footer: format!("simulated: {images} characters that training has not seen"),
-        };
-        chart.render()
+        }
     });
-    below(&charts)
+    Figure::column(charts)
 }

@@ -10,7 +10,6 @@ use nirspi_optics::rain::{Drops, FsoLaw, Medium, PaperRain};
 use nirspi_optics::water::Water;
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use std::fmt::Write as _;
 
 /// Wavelengths of the curves over wavelength, in nm.
 const WAVELENGTHS_NM: (f64, f64, usize) = (400.0, 2000.0, 81);
@@ -34,28 +33,26 @@ pub struct Curves {
     pub chart: Chart,
 }
 
-impl Curves {
-    /// The numbers of all lines: `line,x,y`, with the axes' names.
-    #[must_use]
-    pub fn csv(&self) -> String {
-        let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-        let mut csv =
-            format!("line,{},{}\n", quoted(&self.chart.x.name), quoted(&self.chart.y.name));
-        for line in &self.chart.lines {
-            let name = quoted(&line.name);
-            for (x, y) in &line.points {
-                // Writing to a string does not fail.
-                let _ = writeln!(csv, "{name},{x:.6e},{y:.6e}");
-            }
-        }
-        csv
-    }
-}
-
 /// Kinds of air with a curve.
 struct Air {
     name: String,
     drops: Drops,
+}
+
+/// The air of the drops asked for, and of those beside them.
+fn airs(name: &str, drops: &Drops) -> Result<Vec<Air>> {
+    let air = |name: &str, drops| Air { name: name.to_owned(), drops };
+    let heavy = PaperRain::HEAVY.rate_mm_per_h;
+    let asked = air(&format!("{name} (asked for)"), drops.clone());
+    let others = [
+        air("light, 0.5 mm", PaperRain::LIGHT.drops()?),
+        air("heavy, 2 mm", PaperRain::HEAVY.drops()?),
+        air("Marshall-Palmer, 5.6 mm/h", Drops::marshall_palmer(heavy)?),
+        air("fog, 10 µm, 0.1 g/m3", Drops::fog(10.0, 0.1)?),
+    ];
+    // The rain asked for may be one of the others.
+    let others = others.into_iter().filter(|other| other.drops != *drops);
+    Ok(std::iter::once(asked).chain(others).collect())
 }
 
 /// All curves: of `drops`, called `name`, of the paper's two rains, of Marshall and Palmer's rain
@@ -65,15 +62,7 @@ struct Air {
 /// [`EvalError::is_setting`] for a wavelength without an index of water, or drops that are not
 /// possible.
 pub fn curves(name: &str, drops: &Drops, wavelengths_nm: &[f64]) -> Result<Vec<Curves>> {
-    let air = |name: &str, drops| Air { name: name.to_owned(), drops };
-    let heavy = PaperRain::HEAVY.rate_mm_per_h;
-    let airs = [
-        air(&format!("{name} (asked for)"), drops.clone()),
-        air("light, 0.5 mm", PaperRain::LIGHT.drops()?),
-        air("heavy, 2 mm", PaperRain::HEAVY.drops()?),
-        air("Marshall-Palmer, 5.6 mm/h", Drops::marshall_palmer(heavy)?),
-        air("fog, 10 um, 0.1 g/m3", Drops::fog(10.0, 0.1)?),
-    ];
+    let airs = airs(name, drops)?;
     let mut all = over_wavelength(&airs)?;
     all.extend(over_size(wavelengths_nm)?);
     all.push(sizes(&airs));
@@ -118,8 +107,7 @@ fn over_wavelength(airs: &[Air]) -> Result<Vec<Curves>> {
     let lines = |value: fn(&Medium) -> f64| -> Vec<Line> {
         let of = |(k, (air, media)): (usize, (&Air, &Vec<Medium>))| {
             let points = media.iter().map(|m| (m.wavelength_nm, value(m))).collect();
-            // The rain asked for may be one of the paper's: dashes leave its line visible.
-            Line { dashed: k == 1 || k == 2, ..line(&air.name, k, points) }
+            line(&air.name, k, points)
         };
         airs.iter().zip(&media).enumerate().map(of).collect()
     };
@@ -334,10 +322,18 @@ mod tests {
                     "{name}, {line}: {inside}"
                 );
             }
-            let csv = all.iter().find(|curves| curves.name == *name).unwrap().csv();
-            let points: usize = chart.lines.iter().map(|line| line.points.len()).sum();
-            assert_eq!(csv.lines().count(), 1 + points, "{name}");
         }
+    }
+
+    #[test]
+    fn the_rain_asked_for_has_one_curve_if_it_is_one_of_the_others() {
+        let names = |drops: &Drops| -> Vec<String> {
+            airs("asked", drops).unwrap().into_iter().map(|air| air.name).collect()
+        };
+        assert_eq!(names(&Drops::gamma(5.6, 2.0, 3.0).unwrap()).len(), 5);
+        let found = names(&Drops::marshall_palmer(PaperRain::HEAVY.rate_mm_per_h).unwrap());
+        assert_eq!(found.len(), 4, "{found:?}");
+        assert!(!found.contains(&"Marshall-Palmer, 5.6 mm/h".to_owned()), "{found:?}");
     }
 
     #[test]

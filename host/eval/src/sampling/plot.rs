@@ -1,40 +1,36 @@
-//! The picture of a sampling study: the best image at each share; and for each order the gain over
-//! zero filling of the best methods, with their images.
+//! The figures of a sampling study: the best image at each share and, for each order, the gain over
+//! zero filling of the best methods, on one axis; and the images of the best methods of each order.
 //!
 //! # Invariant
 //! A method has the same colour in all orders, and no two methods of one order look alike
-//! (`super::tests::the_picture_has_a_panel_for_each_order_with_lines_that_differ`).
+//! (`super::tests::the_picture_has_a_panel_for_each_order_with_lines_that_differ`). All charts have
+//! the same axes.
 
 use super::tables::signed;
 use super::{Report, Shown, ZERO_FILLING};
-use image::RgbImage;
-use nirspi::picture::{
-    Axis, Chart, Line, Panel, Range, Scale, SideBySide, Unit, below, beside, blank,
-};
+use nirspi::picture::{Axis, Chart, Figure, Line, Panel, Range, Scale, SideBySide, Unit};
 use nirspi_recon::Image;
 
 /// Number of methods with a line in the chart of an order.
 const LINES: usize = 4;
-/// Frame of a chart, and edge of an image.
-const FRAME_PX: (u32, u32) = (460, 270);
-const IMAGE_PX: u32 = 256;
+/// The look of zero filling: the last colour, dashed. No method has this colour.
+const ZERO_COLOUR: usize = Line::LOOKS / 2 - 1;
 
-/// The whole picture.
-pub(super) fn draw(report: &Report, orders: &[String], methods: &[String]) -> RgbImage {
-    let mut rows: Vec<RgbImage> =
-        summary(report).map(|row| row.render_at(IMAGE_PX)).into_iter().collect();
-    let share = telling_share(report);
-    let charts = charts(report, orders, methods);
-    let drawn: Vec<RgbImage> = charts.iter().map(|chart| chart.render_at(FRAME_PX)).collect();
-    // Images of all orders below each other, also where the names of methods are short.
-    let widest = drawn.iter().map(RgbImage::width).max().unwrap_or(1);
-    for (chart, drawn) in charts.iter().zip(drawn) {
-        let space = blank(widest - drawn.width(), 1);
-        let mut row = vec![drawn, space];
-        row.extend(images(report, &chart.header, share).map(|row| row.render_at(IMAGE_PX)));
-        rows.push(beside(&row));
+/// The best image at each share, and the charts of all orders.
+pub(super) fn curves(report: &Report, orders: &[String], methods: &[String]) -> Figure {
+    let charts = Figure::grid(2, charts(report, orders, methods));
+    match summary(report) {
+        Some(images) => Figure::column([Figure::Images(images), charts]),
+        None => charts,
     }
-    below(&rows)
+}
+
+/// The images of the best methods of each order; `None` without images.
+pub(super) fn best_images(report: &Report, orders: &[String]) -> Option<Figure> {
+    let share = telling_share(report);
+    let rows: Vec<SideBySide> =
+        orders.iter().filter_map(|order| images(report, order, share)).collect();
+    (!rows.is_empty()).then(|| Figure::column(rows))
 }
 
 /// A method's gains over zero filling.
@@ -84,23 +80,29 @@ pub(super) fn charts(report: &Report, orders: &[String], methods: &[String]) -> 
                 coloured.push(method);
                 coloured.len() - 1
             });
-            // Six colours, then the same with dots, and with dashes; the seventh is zero filling's.
-            let (round, colour) = (colour / 6, colour % 6 + colour / 6 % 2 * 8);
+            // Four colours, the same with other dashes, then both dashed.
+            let (round, hue) = (colour / ZERO_COLOUR, colour % ZERO_COLOUR);
+            let colour = hue + round % 2 * Line::LOOKS / 2;
+            let dashed = round / 2 % 2 == 1;
             let name = method.to_owned();
-            lines.push(Line { name, colour, dashed: round / 2 % 2 == 1, points });
+            lines.push(Line { name, colour, dashed, points });
         }
-        let values = lines.iter().flat_map(|line| &line.points).map(|point| point.1);
-        let y = Axis::around("gain over zero filling, dB", values.chain([0.0]));
         let zero = ends.map(|share| (share, 0.0)).to_vec();
-        lines.push(Line { name: "zero filling".to_owned(), colour: 6, dashed: true, points: zero });
+        let name = "zero filling".to_owned();
+        lines.push(Line { name, colour: ZERO_COLOUR, dashed: true, points: zero });
         charts.push(Chart {
             header: order.clone(),
             x: Axis::of("share of the patterns, %", ticks.clone(), false),
-            y,
+            y: Axis::around("", []),
             lines,
             footer: String::new(),
         });
     }
+    // Orders are compared: all charts have one axis.
+    let points = charts.iter().flat_map(|chart| &chart.lines).flat_map(|line| &line.points);
+    let values: Vec<f64> = points.map(|point| point.1).collect();
+    let y = Axis::around("gain over zero filling, dB", values);
+    charts.iter_mut().for_each(|chart| chart.y = y.clone());
     charts
 }
 
@@ -146,8 +148,8 @@ fn summary(report: &Report) -> Option<SideBySide> {
     Some(SideBySide {
         header: format!("Best image at each share of the patterns: {}", report.input.display()),
         panels,
-        footer: "PSNR against the image of all patterns, on whose scale all images are. Below: each order; the \
-                 charts have their own axes"
+        footer: "PSNR against the image of all patterns, on whose scale all images are. Below: the gain of the best \
+                 methods of each order, on one axis"
             .to_owned(),
     })
 }
@@ -165,5 +167,5 @@ fn images(report: &Report, order: &str, share: f64) -> Option<SideBySide> {
         let caption = format!("{:.2} dB, {gain}", best.psnr_db);
         panel(report, &best.method, &best.image, vec![caption])
     }));
-    Some(SideBySide { header: String::new(), panels, footer: String::new() })
+    Some(SideBySide { header: format!("order {order}"), panels, footer: String::new() })
 }

@@ -3,12 +3,11 @@
 use super::shots::{At, Shot, Studio};
 use super::{AREA, Covered, NATURAL};
 use crate::error::Result;
-use image::RgbImage;
-use nirspi::picture::{Axis, Chart, Line, Panel, Range, SideBySide, Unit};
+use nirspi::picture::{Axis, Chart, Figure, Line, Panel, Range, SideBySide, Unit};
 use nirspi_nets::interval::{Intervals, share_of_prior};
 
 /// The nominal coverage against that seen on natural scenes, one line a method.
-pub(super) fn curve(coverage: &[Covered]) -> RgbImage {
+pub(super) fn curve(coverage: &[Covered]) -> Figure {
     let percent = |share: f64| 100.0 * share;
     let rows: Vec<&Covered> =
         coverage.iter().filter(|row| row.images_of == NATURAL && row.condition == "all").collect();
@@ -38,7 +37,7 @@ pub(super) fn curve(coverage: &[Covered]) -> RgbImage {
             "simulated: {images} images that neither training nor calibration has seen"
         ),
     };
-    chart.render()
+    chart.into()
 }
 
 /// One image for the picture: its values, and what to write below it.
@@ -98,7 +97,7 @@ pub(super) fn cases(
 const BRIGHTER: f32 = 2.0;
 
 /// The picture: each case is a square of enhanced image and truth above half-width and error.
-pub(super) fn picture(cases: Vec<Shown>) -> RgbImage {
+pub(super) fn picture(cases: Vec<Shown>) -> Figure {
     let panels = cases.into_iter().map(|case| {
         let [image, truth, widths, errors] = &case.values;
         let row = |values: &[f32], row: usize| values[64 * row..64 * (row + 1)].to_vec();
@@ -120,5 +119,5 @@ pub(super) fn picture(cases: Vec<Shown>) -> RgbImage {
                  truth; below: half-width, error, both twice as bright"
             .to_owned(),
     };
-    all.render()
+    all.into()
 }

@@ -6,7 +6,7 @@
 //! # Invariant
 //! Labels are never read as an image (`super::tests::labels_are_never_read_as_an_image`).
 
-use super::sign;
+use super::encode_colours;
 use crate::provenance::Provenance;
 use ::image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -57,19 +57,7 @@ pub fn encode_labelled(
 ) -> Vec<u8> {
     let labels = Labels { size: [picture.width(), picture.height()], images, image };
     let text = serde_json::to_string(&labels).expect("numbers are JSON");
-    let mut bytes = Vec::new();
-    let encoded = (|| {
-        let mut encoder = png::Encoder::new(&mut bytes, picture.width(), picture.height());
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.add_text_chunk(KEY.to_owned(), text)?;
-        sign(&mut encoder, provenance)?;
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(picture.as_raw())?;
-        writer.finish()
-    })();
-    encoded.expect("a picture of at least one pixel encodes into memory");
-    bytes
+    encode_colours(picture, &[(KEY, text)], provenance)
 }
 
 /// The labels of a PNG, if it states any. The stream is read up to the first pixel.

@@ -247,3 +247,15 @@ fn a_picture_of_a_wrong_size_is_refused_before_a_pixel_is_decoded() {
     let told = line(&read_grey(&path).map(|_| ()).unwrap_err(), "scene.png");
     assert!(!told.contains("8000"), "{told}");
 }
+
+#[test]
+fn a_picture_of_few_colours_is_smaller_and_the_same() {
+    let few = RgbImage::from_fn(300, 200, |x, y| Rgb([(x / 3) as u8, 7, (y % 2) as u8]));
+    let many = RgbImage::from_fn(300, 200, |x, y| Rgb([x as u8, y as u8, (x * y) as u8]));
+    for (picture, color) in [(few, png::ColorType::Indexed), (many, png::ColorType::Rgb)] {
+        let bytes = encode_rgb(&picture, &provenance());
+        let header = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        assert_eq!(header.info().color_type, color);
+        assert_eq!(image::load_from_memory(&bytes).unwrap().to_rgb8(), picture);
+    }
+}
