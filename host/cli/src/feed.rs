@@ -4,7 +4,7 @@ use super::capture::Args;
 use super::progress::Progress;
 use super::{Usage, print, provenance, reconstruct, settings};
 use anyhow::{Context, Result, bail};
-use nirspi::capture::{FeedProgress, FeedReport, Seconds, StopCause, record_feed};
+use nirspi::capture::{FeedProgress, FeedReport, StopCause, record_feed};
 use nirspi::files::feed::{Address, Feed, FeedError, Recorder};
 use nirspi::files::interrupt;
 use nirspi::files::output::Existing;
