@@ -136,7 +136,7 @@ pub fn of_the_table() -> Vec<Kind> {
         Kind::new("hills", Unit::Psnr, vec![drawing(hills, SIDE)]),
         Kind::new("points", Unit::Psnr, vec![drawing(points, SIDE)]),
         Kind::new("drawn wing, virtual camera", Unit::Correlation, vec![drawn_wing()]),
-        Kind::new("no light", Unit::Psnr, (0..3).map(no_light).collect()),
+        Kind::new("no light", Unit::Psnr, (0..24).map(no_light).collect()),
     ];
     if let Some(data) = data() {
         kinds.extend([
