@@ -3,7 +3,7 @@
 use super::calibration::CalibrationArgs;
 use super::camera::{self, CameraArgs, LIGHT_HELP, SceneArgs, SetupArgs};
 use super::report::{FigureArgs, ReportArgs};
-use super::{Usage, address, feed, print, progress, provenance};
+use super::{Usage, address, print, progress, provenance};
 use anyhow::Result;
 use nirspi::capture::{
     CaptureOptions, CaptureReport, Origin, Preview, Progress, Seconds, StopCause, observe,
@@ -45,7 +45,7 @@ use std::sync::atomic::Ordering;
     \x20 nirspi capture --camera feed:127.0.0.1:5025 --frames 1000 --out rec.npz")]
 pub struct Args {
     #[command(flatten)]
-    camera: CameraArgs,
+    pub(super) camera: CameraArgs,
     #[command(flatten)]
     calibration: CalibrationArgs,
     /// Frames to measure [default: until Ctrl-C]
@@ -86,10 +86,8 @@ pub struct Args {
     pub(super) report: ReportArgs,
 }
 
+/// Records the frames of a camera.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    if let Some(address) = args.camera.feed() {
-        return feed::capture(address, args);
-    }
     let mut setup = args.setup.setup(Sampling::ALL, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
     let mut frames = args.frames;

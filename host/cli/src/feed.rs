@@ -1,11 +1,11 @@
 //! Feeds, the live readings of any bench: `nirspi capture --camera feed:ADDR`.
 
-use super::capture::Args;
+use super::capture::{self, Args};
 use super::progress::Progress;
 use super::{Usage, print, provenance, reconstruct, settings};
 use anyhow::{Context, Result, bail};
 use nirspi::capture::{FeedProgress, FeedReport, StopCause, record_feed};
-use nirspi::files::feed::{Address, Feed, FeedError, Recorder};
+use nirspi::files::feed::{Feed, FeedError, Recorder};
 use nirspi::files::interrupt;
 use nirspi::files::output::Existing;
 use nirspi::source::Source;
@@ -18,8 +18,9 @@ use std::sync::atomic::Ordering;
 const EVERYWHERE: [&str; 7] =
     ["camera", "json", "quiet", "strict", "verbose", "settings", "save-settings"];
 
-/// Records a feed as the options of `capture` ask.
-pub fn capture(address: &Address, args: &Args) -> Result<ExitCode> {
+/// Records a camera or a feed.
+pub fn capture(args: &Args) -> Result<ExitCode> {
+    let Some(address) = args.camera.feed() else { return capture::run(args) };
     let Args { frames, seconds, overwrite, figure, report, .. } = *args;
     let (out, picture) = (args.out.as_deref(), args.picture.as_deref());
     refuse_others(&["frames", "seconds", "out", "overwrite", "picture", "figure"])?;

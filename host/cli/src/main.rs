@@ -106,7 +106,7 @@ commands! { Command, run:
     /// Export or repair recordings
     #[command(subcommand)]
     Recording(RecordingCommand) => run_recording,
-    Capture(capture::Args) => capture::run,
+    Capture(capture::Args) => feed::capture,
     /// Find a camera, check and calibrate it, bring it up to date
     #[command(subcommand)]
     Camera(CameraCommand) => run_camera,
