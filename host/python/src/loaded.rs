@@ -40,6 +40,8 @@ pub struct Loaded {
     flat_field: Option<Py<FlatField>>,
     /// Standard deviation of the noise of a difference of the one measurement, if it is known.
     noise: Option<f64>,
+    /// What it is at most, if sums of patterns and complements say it.
+    most_noise: Option<f64>,
 }
 
 /// The measurements of a file or recording: one, or all with `index` "all".
@@ -91,6 +93,7 @@ impl Loaded {
             damage: None,
             flat_field: None,
             noise: None,
+            most_noise: None,
         }))
     }
 
@@ -121,6 +124,7 @@ impl Loaded {
         }
         let flat_field = first.flat_field.clone();
         let noise = first.measurements.noise().filter(|_| !several);
+        let most_noise = first.measurements.most_noise().filter(|_| !several);
         Ok(Self {
             n: side.pixels(),
             rows: array(py, rows.iter().map(|&row| i64::from(row)).collect()).unbind(),
@@ -133,6 +137,7 @@ impl Loaded {
             notes,
             damage: first.damage.clone(),
             noise,
+            most_noise,
             flat_field: flat_field.map(|flat| Py::new(py, FlatField(flat))).transpose()?,
             dropouts: sources.into_iter().map(|source| lost(source.dropouts)).collect(),
         })

@@ -53,6 +53,8 @@ pub(crate) struct Options<'py> {
     warm_start: bool,
     /// Standard deviation of the noise of a difference; `None`: estimated.
     noise: Option<f64>,
+    /// What it is at most.
+    most_noise: Option<f64>,
     dark: bool,
     device: String,
 }
@@ -122,10 +124,10 @@ impl Options<'_> {
 }
 
 /// The measurements of a frame without the patterns that were not read (NaN).
-fn frame(rows: &Rows, d: &[f64], noise: Option<f64>) -> PyResult<Measurements> {
-    let with_noise = |measurements: Measurements| match noise {
+fn frame(rows: &Rows, d: &[f64], noise: Noise) -> PyResult<Measurements> {
+    let with_noise = |measurements: Measurements| match noise.known {
         Some(noise) => measurements.with_noise(noise),
-        None => Ok(measurements),
+        None => Ok(measurements.with_most_noise(noise.most)),
     };
     // Without an early end, so that the compiler uses vectors.
     if !d.iter().fold(false, |nan, value| nan | value.is_nan()) {
@@ -148,14 +150,20 @@ fn of_method(error: ReconstructError) -> PyErr {
     refusal(error)
 }
 
+/// What is known of the noise of a difference.
+#[derive(Clone, Copy, Default)]
+struct Noise {
+    known: Option<f64>,
+    most: Option<f64>,
+}
+
 /// A method made ready for measurements of the same rows.
 struct Ready {
     method: Box<dyn Reconstruct>,
     rows: Rows,
     first: FirstPatterns,
     sampling: f64,
-    /// Noise of a difference, if it is known.
-    noise: Option<f64>,
+    noise: Noise,
     /// Worked out once, for all measurements without a pattern that was not read.
     whole: ShorterSweep,
     order: String,
@@ -168,7 +176,7 @@ impl Ready {
         rows: Rows,
         first: FirstPatterns,
         sampling: f64,
-        noise: Option<f64>,
+        noise: Noise,
     ) -> PyResult<Self> {
         let method = method.prepare(settings).map_err(of_method)?;
         let (whole, order) = first.among(&rows, sampling).map_err(refusal)?;
@@ -326,7 +334,8 @@ pub fn reconstruct<'py>(
     let options: Options<'_> = options.extract()?;
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
-    let (warm, noise) = (options.warm_start, options.noise);
+    let warm = options.warm_start;
+    let noise = Noise { known: options.noise, most: options.most_noise };
     if warm && !method.takes(Setting::WarmStart) {
         let methods = Method::listed(|method| method.takes(Setting::WarmStart));
         return Err(refused(format!("warm-start belongs to {methods}, not to {method}")));
@@ -380,7 +389,8 @@ pub fn reconstruct_file<'py>(
     let mut place = pixels.readwrite();
     let places = fill(&mut place)?;
     let account = long(py, |stop| {
-        let ready = Ready::new(method, &settings, stack.rows().clone(), first, sampling, None)?;
+        let ready =
+            Ready::new(method, &settings, stack.rows().clone(), first, sampling, Noise::default())?;
         let one = |d: &[f64], place: &mut [f32]| match stop.load(Ordering::Relaxed) {
             true => None,
             false => ready.image(d, place).ok(),

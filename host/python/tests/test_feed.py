@@ -37,6 +37,18 @@ def expected(seed=7):
     return pixels(ns.Measurement(y=volts(seed), rows=ROWS, n=N))
 
 
+def interruptible(command, folder):
+    """A program that Ctrl-C reaches, also where the tests run in the background and ignore it."""
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL) and None,
+    )
+
+
 @contextlib.contextmanager
 def sent(*pieces):
     """An address at which these bytes are sent to the first program that connects."""
@@ -306,9 +318,7 @@ def test_five_lines_of_the_page_show_a_generator_until_ctrl_c(tmp_path):
     made = "pairs = [2.5, 0.5] * (64 * 64)\ndef blocks():\n    while True:\n        yield pairs\ndaq = blocks()\n"
     script = made + lines.replace('unit="V"', 'unit="V", listen="127.0.0.1:0"')
     (tmp_path / "bench.py").write_text(script)
-    run = subprocess.Popen(
-        [sys.executable, "bench.py"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    run = interruptible([sys.executable, "bench.py"], tmp_path)
     try:
         url = re.match(r"open (http://\S+) to see DMD", run.stdout.readline())[1]
         state(url, lambda state: state["frames"]["received"] >= 3)
@@ -335,13 +345,7 @@ def test_the_images_of_the_page_about_feeds_are_made():
 def test_ctrl_c_ends_the_wait_for_a_header(tmp_path):
     (tmp_path / "log.txt").write_text("")
     script = "import nirspi\nprint('now', flush=True)\nnirspi.Feed('log.txt')\n"
-    run = subprocess.Popen(
-        [sys.executable, "-c", script],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    run = interruptible([sys.executable, "-c", script], tmp_path)
     try:
         run.stdout.readline()
         time.sleep(0.5)

@@ -184,14 +184,16 @@ impl Measurements {
     }
 
     /// The same measurements, whose noise is at most this standard deviation by what else was seen of
-    /// their readings.
+    /// their readings. It bounds the noise that is estimated where none was
+    /// [measured](Self::with_noise).
     #[must_use]
-    pub(crate) fn with_most_noise(self, most_noise: Option<f64>) -> Self {
+    pub fn with_most_noise(self, most_noise: Option<f64>) -> Self {
         Self { most_noise, ..self }
     }
 
     /// What the noise of a value is at most, by the sums of patterns and complements.
-    pub(crate) fn most_noise(&self) -> Option<f64> {
+    #[must_use]
+    pub fn most_noise(&self) -> Option<f64> {
         self.most_noise
     }
 

@@ -46,6 +46,9 @@ class Measurement:
     noise : float, optional
         Standard deviation of the noise of a value of ``d``, the same for all. :func:`reconstruct`
         weights each reading by it, and estimates it if it is not given.
+    most_noise : float, optional
+        What this noise is at most, where it is estimated. :func:`load` finds it of patterns with
+        their complements, whose sums change by noise alone.
 
     Attributes
     ----------
@@ -88,6 +91,7 @@ class Measurement:
     notes: list[str] = field(default_factory=list)
     flat_field: Any = field(default=None, repr=False)
     noise: float | None = None
+    most_noise: float | None = None
 
     def __post_init__(self, y: Any, readings: str, transpose: bool, copy: bool) -> None:
         if (self.d is None) == (y is None):
@@ -613,5 +617,5 @@ def _of_loaded(found: _nirspi.Loaded) -> Measurement:
     if found.damage is not None:
         made.notes.insert(0, found.damage)
         warnings.warn(found.damage, RuntimeWarning, stacklevel=3)
-    made.noise = found.noise
+    made.noise, made.most_noise = found.noise, found.most_noise
     return made

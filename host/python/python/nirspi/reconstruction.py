@@ -177,6 +177,7 @@ def reconstruct(
         measurement = measurement[index]
     side: int = measurement.n
     options["noise"] = measurement.noise
+    options["most_noise"] = measurement.most_noise
     if dictionary is not None:
         options["dictionary"] = _atoms(dictionary, (side, side))
     d = measurement.d
@@ -234,6 +235,7 @@ def method_options(
         "non_negative": bool(non_negative),
         "warm_start": bool(warm_start),
         "noise": None,
+        "most_noise": None,
         "dark": bool(dark),
         "device": str(device),
     }
