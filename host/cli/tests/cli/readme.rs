@@ -26,6 +26,7 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("", "-- serve", "runs until it is stopped; tests/cli/serve.rs"),
     ("", "virtual --", "runs until it is stopped; tests/cli/capture_tcp.rs and tests/tests/qemu"),
     ("", "--camera usb", "needs a camera on USB"),
+    ("", "--camera feed:127.0.0.1:", "needs the readings of another program; tests/cli/feed.rs"),
     ("", "--camera tcp:", "needs the camera of another terminal; tests/cli/capture_tcp.rs"),
     ("", "nirspi dev pairs", "the user's characters; tests/cli/pairs.rs"),
     ("", "python -m nirspi.train", "needs PyTorch; .ci/run python-peers"),
