@@ -5,6 +5,7 @@
 //! (`tests::the_three_files_of_a_figure_have_the_same_texts_and_images`).
 
 use super::look::{Colour, Look};
+use crate::provenance::Provenance;
 
 /// One thing that is drawn. Lengths are pixels of the PNG, from the upper left corner.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +66,19 @@ impl Drawing {
             }
             self.shapes.push(shape);
         }
+    }
+
+    /// The drawing as files: endings and bytes of its PNG, of SVG and of PDF.
+    pub(super) fn files(
+        &self,
+        png: Vec<u8>,
+        provenance: &Provenance,
+    ) -> Vec<(&'static str, Vec<u8>)> {
+        vec![
+            ("png", png),
+            ("svg", self.svg(provenance).into_bytes()),
+            ("pdf", self.pdf(provenance)),
+        ]
     }
 
     /// Columns and rows as a PNG.

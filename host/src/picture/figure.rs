@@ -112,11 +112,7 @@ impl Figure {
     ) -> Vec<(&'static str, Vec<u8>)> {
         let look = style.look();
         let drawing = signed(self.draw(&look), &look, provenance);
-        let mut files = vec![
-            ("png", self.png(&look, provenance)),
-            ("svg", drawing.svg(provenance).into_bytes()),
-            ("pdf", drawing.pdf(provenance)),
-        ];
+        let mut files = drawing.files(self.png(&look, provenance), provenance);
         files.extend(self.csv(provenance).map(|csv| ("csv", csv.into_bytes())));
         files
     }

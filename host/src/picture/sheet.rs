@@ -140,11 +140,7 @@ impl<'a> Sheet<'a> {
     ) -> Vec<(&'static str, Vec<u8>)> {
         let look = style.look();
         let drawing = signed(self.draw(&look), &look, provenance);
-        vec![
-            ("png", self.png(&look, provenance)),
-            ("svg", drawing.svg(provenance).into_bytes()),
-            ("pdf", drawing.pdf(provenance)),
-        ]
+        drawing.files(self.png(&look, provenance), provenance)
     }
 
     /// What is shown of how many, and on which scale.

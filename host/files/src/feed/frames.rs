@@ -239,7 +239,8 @@ impl Frames {
         }
     }
 
-    /// Whether the reading that was begun has so many samples that only the edge after it is missing.
+    /// Whether a trigger began this reading and more than half of its samples came. At the end of a
+    /// feed, only the next edge is then missing.
     fn is_whole_reading(&self) -> bool {
         self.trigger.is_some()
             && self.taken > self.samples.settle

@@ -26,7 +26,7 @@ pub(super) enum Edge {
     None,
     /// An edge less than half of a reading after the last one.
     Early,
-    /// The beginning of a reading, after so many readings without an edge.
+    /// A reading begins. Before it, the edges of `lost` readings were missed.
     Begins {
         /// Number of readings without an edge.
         lost: usize,

@@ -19,7 +19,7 @@ use std::str::FromStr;
 /// A set of patterns by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NamedPatterns {
-    /// `fourier:3` or `fourier:4`: of each frequency, cosines in so many steps of a full turn.
+    /// `fourier:3` or `fourier:4`: cosines of each frequency, shifted in 3 or 4 equal steps.
     Fourier {
         /// Steps of a full turn: 3 or 4.
         steps: usize,

@@ -112,7 +112,7 @@ impl Statistics {
         let sum: f64 = tried.iter().map(|(likelihood, _)| weight(likelihood)).sum();
         let falloff = tried.iter().map(|(l, falloff)| weight(l) * falloff).sum::<f64>() / sum;
         tried.sort_by(|(a, _), (b, _)| a.variance.total_cmp(&b.variance));
-        // The noise that is smaller than the true one with this probability.
+        // The true noise is smaller than this with the probability.
         let at = |probability: f64| {
             let mut below = 0.0;
             let found = tried.iter().find(|(likelihood, _)| {
