@@ -304,18 +304,21 @@ fn encode_colours(
 fn indexed(picture: &RgbImage) -> Option<(Vec<u8>, Vec<u8>)> {
     let mut numbers = HashMap::new();
     let mut palette = Vec::new();
-    let mut pixels = Vec::with_capacity(picture.as_raw().len() / 3);
-    for pixel in picture.pixels() {
-        let number = match numbers.get(&pixel.0) {
+    let colours = picture.as_raw().as_chunks::<3>().0;
+    let mut pixels = Vec::with_capacity(colours.len());
+    // Most pixels have the colour of the one before.
+    for run in colours.chunk_by(|a, b| a == b) {
+        let colour = run[0];
+        let number = match numbers.get(&colour) {
             Some(number) => *number,
             None => {
                 let number = u8::try_from(numbers.len()).ok()?;
-                numbers.insert(pixel.0, number);
-                palette.extend(pixel.0);
+                numbers.insert(colour, number);
+                palette.extend(colour);
                 number
             }
         };
-        pixels.push(number);
+        pixels.resize(pixels.len() + run.len(), number);
     }
     Some((palette, pixels))
 }
