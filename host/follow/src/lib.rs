@@ -132,6 +132,3 @@ pub fn follow(frames: &[Timed<'_>], settings: &FollowSettings) -> Result<Followe
     }
     frames.followed(best)
 }
-
-#[cfg(test)]
-mod tests;

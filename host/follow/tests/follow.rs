@@ -1,5 +1,9 @@
-use super::*;
-use nirspi_recon::{Order, Rows, Side};
+//! Frames of targets at rest, in motion, and changing their way. Not beside the code: the Fourier transforms of `rustfft` would be
+//! compiled a second time for them, which takes a minute.
+#![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
+
+use nirspi_follow::{FollowError, FollowSettings, Timed, follow};
+use nirspi_recon::{Measurements, Order, Rows, Side};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
