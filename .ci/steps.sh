@@ -134,7 +134,7 @@ step_test() {
 
 step_gpu() {
     software_vulkan
-    gpu_tests -p nirspi-gpu -p nirspi-recon --features nirspi-recon/wgpu --lib -- omp:: gpu:: pursuit:: cache::
+    gpu_tests -p nirspi-gpu -p nirspi-omp -p nirspi-recon --features nirspi-recon/wgpu --lib -- omp:: gpu:: pursuit:: cache::
 }
 
 # Networks and the program: both are built for this alone, and software Vulkan takes minutes for their kernels.
@@ -226,7 +226,7 @@ step_release_folder() {
 
 step_emulation() {
     emulated_firmware
-    cargo test --locked --test budgets --test qemu --test faults -- --nocapture
+    cargo test --locked --test all -- budgets:: qemu:: faults:: --nocapture
 }
 
 # Unicorn is under the GPL: a tool like QEMU, loaded by these tests alone.

@@ -23,6 +23,7 @@ FOLDER = cuda_source.TARGET / "cuda-driver"
 
 # Packages with tests of kernels, and the names of those tests.
 TESTS = {
+    "nirspi-omp": [],
     "nirspi-recon": ["omp::"],
     "nirspi-nets": ["gpu::"],
 }

@@ -21,7 +21,7 @@ import sys
 FOLDER = pathlib.Path(__file__).parent
 WHOLE = ["test"]
 # Commands whose packages depend on this one: CI's steps `gpu`, `rtl` and `mie`.
-GPU = ["nirspi-gpu", "nirspi-recon", "nirspi-nets", "nirspi-eval", "nirspi-cli"]
+GPU = ["nirspi-gpu", "nirspi-omp", "nirspi-recon", "nirspi-nets", "nirspi-eval", "nirspi-cli"]
 PARTS = [
     ["test", *(f"-p{name}" for name in GPU), "--features", "nirspi-cli/wgpu", "--lib", "--test", "cli"],
     ["test", "-p", "nirspi-hdl-sim", "-p", "nirspi-tests-rtl"],

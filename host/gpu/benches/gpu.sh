@@ -29,16 +29,16 @@ pack() {
     strip -o .gpu/nirspi "$target/release/nirspi"
     # Of profile dev: its debug assertions fill buffers with NaN, so that a number that no kernel writes is seen.
     # The packages that have tests on a GPU, in one build with one set of features.
-    cargo test --locked --no-run --lib -p nirspi-recon -p nirspi-nets --features nirspi-nets/gpu 2>&1 | tee .gpu/log
+    cargo test --locked --no-run --lib -p nirspi-omp -p nirspi-recon -p nirspi-nets --features nirspi-nets/gpu 2>&1 | tee .gpu/log
     local crate built
-    for crate in recon nets; do
+    for crate in omp recon nets; do
         built=$(sed -n "s/.*(\(.*nirspi_$crate-[0-9a-f]*\)).*/\1/p" .gpu/log)
         strip -o ".gpu/tests-$crate" "$built"
     done
     rm .gpu/log
-    # One archive with one dictionary: the three programs hold the same weights.
-    tar -C .gpu -c nirspi tests-recon tests-nets | xz --lzma2=preset=9,dict=128MiB >.gpu/programs.tar.xz
-    rm .gpu/nirspi .gpu/tests-recon .gpu/tests-nets
+    # One archive with one dictionary: several of the programs hold the same weights.
+    tar -C .gpu -c nirspi tests-omp tests-recon tests-nets | xz --lzma2=preset=9,dict=128MiB >.gpu/programs.tar.xz
+    rm .gpu/nirspi .gpu/tests-omp .gpu/tests-recon .gpu/tests-nets
     # As it is: pip would build it, and its compiled helpers are for another variant than ours.
     python3 - <<'END' || echo "skipped: no batched-omp from PyPI, peers.py will say so"
 import re, urllib.request
@@ -119,9 +119,10 @@ bench() {
 correctness() {
     local failed=0
     # The same tests as on software Vulkan.
+    NIRSPI_TEST_BACKEND=cuda step tests-omp 120 "$work/tests-omp" --nocapture || failed=1
     NIRSPI_TEST_BACKEND=cuda step tests-recon 120 "$work/tests-recon" omp:: --nocapture || failed=1
     step tests-nets 200 "$work/tests-nets" gpu:: networks:: enhance::device --nocapture || failed=1
-    if grep -h '^skipped: .*CUDA' "$out/tests-recon.txt" "$out/tests-nets.txt" | sort | uniq -c | grep .; then
+    if grep -h '^skipped: .*CUDA' "$out/tests-omp.txt" "$out/tests-recon.txt" "$out/tests-nets.txt" | sort | uniq -c | grep .; then
         echo "tests on CUDA: skipped" | tee -a "$out/summary.txt"
         failed=1
     fi
@@ -141,7 +142,7 @@ correctness() {
                 failed=1
         done
         NIRSPI_TEST_BACKEND=cuda step racecheck-omp 60 compute-sanitizer --tool racecheck --error-exitcode 9 \
-            "$work/tests-recon" images_are || failed=1
+            "$work/tests-omp" images_are || failed=1
     fi
     return $failed
 }

@@ -21,36 +21,23 @@
 //! | [`Sampling`] | `0.3`, `30%` or `30` | a checked share of the patterns |
 //! | [`words`] | a count, a number | the same as people write it |
 
-pub mod backend;
-pub mod basis;
-pub mod fwht;
-mod image;
 pub mod law;
 pub mod leak;
 mod measurements;
 pub mod metrics;
-pub mod omp;
-pub mod order;
 pub mod reconstruct;
 mod repeats;
-mod rows;
-mod sampling;
-mod side;
-mod size;
 #[cfg(test)]
 mod testing;
 pub mod words;
 
-pub use backend::{Backend, ParseBackendError};
-pub use basis::{Basis, ParseBasisError};
-pub use fwht::{FwhtLengthError, fwht};
-pub use image::Image;
 pub use law::{Dropout, Outlier};
 pub use leak::{Leak, LeakError, Sweep};
 pub use measurements::{MeasurementError, Measurements, ShorterSweep};
-pub use order::{NamedOrder, Order, ParseOrderError};
+pub use nirspi_omp::{self as omp, Backend, ParseBackendError, backend};
+pub use nirspi_patterns::{
+    Basis, FwhtLengthError, Image, NamedOrder, Order, ParseBasisError, ParseOrderError, Rows,
+    RowsError, Sampling, SamplingError, Shape, Side, SideError, Size, SizeError, basis, fwht,
+    order,
+};
 pub use repeats::Repeats;
-pub use rows::{Rows, RowsError};
-pub use sampling::{Sampling, SamplingError};
-pub use side::{Side, SideError};
-pub use size::{Shape, Size, SizeError};

@@ -50,7 +50,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "orders",
         reads: "an order table (text)",
-        readers: &["host/files/src/order_table.rs", "host/recon/src/rows.rs"],
+        readers: &["host/files/src/order_table.rs", "host/patterns/src/rows.rs"],
         holds: orders,
         seeds: order_seeds,
         longest: 6144,
