@@ -24,9 +24,9 @@ lint:
 # Write the generated documentation, register map and SystemVerilog again. Builds the Veryl simulator
 bless:
     NIRSPI_BLESS=1 cargo test --locked -p nirspi-wire
-    NIRSPI_BLESS=1 cargo test --locked --test boards --test glossary --test safety_page --test security_page
+    NIRSPI_BLESS=1 cargo test --locked --test all --test library -- boards glossary safety_page security_page
     NIRSPI_BLESS=1 cargo test --locked --test cli reference
-    NIRSPI_BLESS=1 cargo test --locked --test faults
+    NIRSPI_BLESS=1 cargo test --locked --test all faults
     NIRSPI_BLESS=1 cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl stale
 
 # Build the book (needs mdBook) into target/book

@@ -2,7 +2,7 @@
 # Builds the firmware of every board, or of those that are named, into boards/target:
 #   bash boards/build.sh [NAME...]
 # FEATURES=parallel builds with that feature, into the same place.
-# `cargo test --test budgets` then prints the sizes. Uses rustup's targets where rustup can get them. Elsewhere (Debian and
+# `cargo test --test all budgets` then prints the sizes. Uses rustup's targets where rustup can get them. Elsewhere (Debian and
 # Ubuntu, no network but the package mirror) it uses Debian's compiler and the sources of its library, unpacked into
 # boards/target, nothing installed. NIRSPI_FALLBACK=1 always uses Debian's compiler.
 set -euo pipefail

@@ -19,7 +19,7 @@ TARGET = ROOT / "target" / "coverage"
 PLACES = [
     (
         "packets, on both sides",
-        [("nirspi-wire", "packets", "any_bytes"), ("nirspi-wire", None, "any_bytes")],
+        [("nirspi-wire", "wire", "packets::any_bytes"), ("nirspi-wire", None, "any_bytes")],
         ["mcu/wire/src/packet.rs", "mcu/wire/src/stuffing.rs", "mcu/wire/src/samples.rs"],
     ),
     (
@@ -27,38 +27,38 @@ PLACES = [
         [("nirspi-mcu", None, "nothing_panics")],
         ["mcu/src/commands.rs", "mcu/src/configure.rs", "mcu/src/machine.rs", "mcu/src/poll.rs", "mcu/src/run.rs"],
     ),
-    ("requests of the tunnel", [("nirspi-tests", "mutated_files", "requests_of")], ["mcu/wire/src/tunnel.rs"]),
+    ("requests of the tunnel", [("nirspi-tests", "all", "mutated_files::requests_of")], ["mcu/wire/src/tunnel.rs"]),
     (
         "order tables, tables of numbers",
-        [("nirspi-tests", "mutated_files", "order_tables")],
+        [("nirspi-tests", "all", "mutated_files::order_tables")],
         ["host/files/src/order_table.rs", "host/files/src/table.rs"],
     ),
     (
         "camera descriptions",
-        [("nirspi-tests", "mutated_files", "camera_descriptions")],
+        [("nirspi-tests", "all", "mutated_files::camera_descriptions")],
         ["host/virtual/src/model.rs"],
     ),
     (
         "calibrations",
-        [("nirspi-tests", "mutated_files", "calibrations")],
+        [("nirspi-tests", "all", "mutated_files::calibrations")],
         ["host/camera/src/calibration/kept.rs", "host/camera/src/calibration/file.rs"],
     ),
     (
         "pictures",
-        [("nirspi-tests", "mutated_files", "pictures"), ("nirspi", None, "files::image::tests::no_damage")],
+        [("nirspi-tests", "all", "mutated_files::pictures"), ("nirspi-files", None, "image::tests::no_damage")],
         ["host/files/src/image.rs"],
     ),
     (
         "arrays",
         [
-            ("nirspi-tests", "mutated_files", "pictures"),
-            ("nirspi", None, "makes_the_reader_panic"),
+            ("nirspi-tests", "all", "mutated_files::pictures"),
+            ("nirspi-files", None, "makes_the_reader_panic"),
         ],
         ["host/files/src/array.rs", "host/files/src/npy.rs"],
     ),
     (
         "measurements",
-        [("nirspi-tests", "mutated_files", "measurements"), ("nirspi", None, "files::fields::tests")],
+        [("nirspi-tests", "all", "mutated_files::measurements"), ("nirspi-files", None, "fields::tests")],
         [
             "host/files/src/archive.rs",
             "host/files/src/fields.rs",
@@ -75,12 +75,12 @@ PLACES = [
     ),
     (
         "recordings",
-        [("nirspi-tests", "mutated_files", "recordings"), ("nirspi", None, "any_bytes_are_scanned")],
+        [("nirspi-tests", "all", "mutated_files::recordings"), ("nirspi-record", None, "any_bytes_are_scanned")],
         ["host/record/src/recording/reader.rs", "host/record/src/recording/scan.rs", "host/record/src/recording/run.rs", "host/camera/src/tally.rs"],
     ),
-    ("weights of networks", [("nirspi-tests", "mutated_files", "weights")], ["host/nets/src/weights.rs"]),
-    ("settings that a page sends", [("nirspi-tests", "mutated_files", "what_a_page")], ["host/serve/src/settings.rs"]),
-    ("bitstreams", [("nirspi-tests", "mutated_files", "bitstreams")], ["mcu/src/staging.rs"]),
+    ("weights of networks", [("nirspi-tests", "all", "mutated_files::weights")], ["host/nets/src/weights.rs"]),
+    ("settings that a page sends", [("nirspi-tests", "all", "mutated_files::what_a_page")], ["host/serve/src/settings.rs"]),
+    ("bitstreams", [("nirspi-tests", "all", "mutated_files::bitstreams")], ["mcu/src/staging.rs"]),
 ]
 
 
@@ -92,7 +92,7 @@ def tools() -> pathlib.Path:
 
 
 def build() -> dict[tuple[str, str | None], str]:
-    """The test binaries, by package and name of the test file."""
+    """The test binaries, by package and name of the test program."""
     wanted = {(package, binary) for _, tests, _ in PLACES for package, binary, _ in tests}
     command = ["cargo", "test", "--locked", "--no-run", "--message-format=json-render-diagnostics", "--lib"]
     command += [part for _, binary in sorted(wanted, key=str) if binary for part in ("--test", binary)]

@@ -40,9 +40,6 @@ fn tooltips_of_the_page_are_the_glossarys_sentences() {
     if std::env::var_os("NIRSPI_BLESS").is_some() {
         std::fs::write(root.join("serve/src/page/words.js"), wanted).unwrap();
     } else {
-        assert_eq!(
-            page, wanted,
-            "NIRSPI_BLESS=1 cargo test -p nirspi --test glossary rewrites them"
-        );
+        assert_eq!(page, wanted, "NIRSPI_BLESS=1 cargo test --test library glossary rewrites them");
     }
 }

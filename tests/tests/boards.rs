@@ -289,7 +289,7 @@ fn the_list_of_the_host_program_is_that_of_the_files() {
     if std::env::var_os("NIRSPI_BLESS").is_some() {
         std::fs::write(&path, &expected).expect("a written list");
     }
-    let stale = "host/files/src/boards/list.in is stale: NIRSPI_BLESS=1 cargo test -p nirspi-tests --test boards writes it anew";
+    let stale = "host/files/src/boards/list.in is stale: NIRSPI_BLESS=1 cargo test --test all boards writes it anew";
     assert!(std::fs::read_to_string(&path).unwrap_or_default() == expected, "{stale}");
     assert!(std::env::var_os("NIRSPI_BLESS").is_some() || BOARDS == boards(), "{stale}");
 }
@@ -367,7 +367,7 @@ fn check_rows(path: &str, header: &str, is_row: impl Fn(&str) -> bool, rows: &[S
     assert_eq!(
         lines[start..start + length],
         *rows,
-        "{path} is stale: NIRSPI_BLESS=1 cargo test -p nirspi-tests --test boards writes it anew"
+        "{path} is stale: NIRSPI_BLESS=1 cargo test --test all boards writes it anew"
     );
 }
 

@@ -19,13 +19,13 @@ const HEADING: &str = "## Each fault";
 
 const HEAD: &str = "# Reliability
 
-What happens when something fails between camera and host. `cargo test --test faults` tries the
+What happens when something fails between camera and host. `cargo test --test all faults` tries the
 cells of the [table](#each-fault) and writes this page (`NIRSPI_BLESS=1`); a stale page fails the
 test. Everything here is simulated:
 
 | column | camera | link | tried by |
 | -- | -- | -- | -- |
-| virtual camera | the firmware's logic on the gateware's golden model | in the process | `cargo test --test faults` |
+| virtual camera | the firmware's logic on the gateware's golden model | in the process | `cargo test --test all faults` |
 | over TCP | the same behind the program's server | a socket of the same machine | the same |
 | replay | a recording of the virtual camera | a file | the same |
 | emulated board | the firmware's machine code in QEMU, the golden model behind it | a serial line | the same, where QEMU is; elsewhere the test says `skipped: no qemu` and keeps the cells |
@@ -165,5 +165,5 @@ fn every_fault_is_counted_and_survived() {
         std::fs::write(&path, &page).unwrap();
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(found == page, "{PAGE} is stale: NIRSPI_BLESS=1 cargo test --test faults\n{page}");
+    assert!(found == page, "{PAGE} is stale: NIRSPI_BLESS=1 cargo test --test all faults\n{page}");
 }

@@ -51,7 +51,7 @@ fn the_tables_of_the_page_are_those_of_the_command() {
     if std::env::var_os("NIRSPI_BLESS").is_some() {
         std::fs::write(&path, &made).unwrap();
     } else {
-        assert!(page == made, "{PAGE} is stale: NIRSPI_BLESS=1 cargo test --test safety_page");
+        assert!(page == made, "{PAGE} is stale: NIRSPI_BLESS=1 cargo test --test all safety_page");
     }
 }
 

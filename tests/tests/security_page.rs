@@ -109,7 +109,10 @@ fn every_place_of_unsafe_code_is_listed_with_its_reason() {
     if std::env::var_os("NIRSPI_BLESS").is_some() {
         std::fs::write(&path, &made).unwrap();
     } else {
-        assert!(page == made, "{PAGE} is stale: NIRSPI_BLESS=1 cargo test --test security_page");
+        assert!(
+            page == made,
+            "{PAGE} is stale: NIRSPI_BLESS=1 cargo test --test all security_page"
+        );
     }
 }
 

@@ -12,8 +12,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// The marks around the table.
-const BEGIN: &str =
-    "<!-- table: NIRSPI_BLESS=1 cargo test -p nirspi-optics --test error_budget -->\n";
+const BEGIN: &str = "<!-- table: NIRSPI_BLESS=1 cargo test --test optics error_budget -->\n";
 const END: &str = "\n<!-- end of table -->";
 
 /// What is assumed, its value, another value, and the change of the description.

@@ -4,7 +4,7 @@
 //! # Invariant
 //! Simulated time advances only with accesses, so the speed of the emulator changes no frame
 //! (`frames_from_the_emulated_board_are_those_of_the_virtual_camera_bit_for_bit` in
-//! `tests/tests/qemu`).
+//! `tests/tests/qemu.rs`).
 
 use super::SimulatedFpga;
 use nirspi::link::is_hangup;

@@ -1,4 +1,4 @@
-// The page's tooltips. From docs/glossary.md by `NIRSPI_BLESS=1 cargo test -p nirspi --test glossary`.
+// The page's tooltips. From docs/glossary.md by `NIRSPI_BLESS=1 cargo test --test library glossary`.
 
 export const MEANINGS = {
   "blur": "Standard deviation of the blur that the networks remove, estimated from the image, in pixels of the 64 x 64 image.",

@@ -1,0 +1,16 @@
+//! Tests of the crate as its users see it.
+
+mod adc_noise;
+mod array;
+mod chain;
+mod depth;
+mod edges;
+mod error_budget;
+mod eye_safety;
+mod mie;
+mod motion;
+mod projector;
+mod rain;
+mod range;
+mod scene_in_rain;
+mod through_the_noise;

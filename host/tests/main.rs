@@ -1,0 +1,12 @@
+//! Tests of the library as its users see it.
+
+mod account;
+mod damaged_recordings;
+#[cfg(feature = "enhance")]
+mod export;
+mod exported_frames;
+mod glossary;
+mod recordings;
+mod replay;
+mod session;
+mod split;
