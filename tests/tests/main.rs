@@ -9,6 +9,7 @@ mod end_to_end;
 mod faults;
 mod mutated_files;
 mod qemu;
+mod quality_page;
 mod register_table;
 mod safety;
 mod safety_page;
