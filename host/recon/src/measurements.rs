@@ -183,6 +183,11 @@ impl Measurements {
         Ok(self)
     }
 
+    /// The same measurements with this noise, which is known to be finite and not negative.
+    pub(crate) fn of_noise(self, noise: f64) -> Self {
+        Self { noise: Some(noise), ..self }
+    }
+
     /// The same measurements, whose noise is at most this standard deviation by what else was seen of
     /// their readings. It bounds the noise that is estimated where none was
     /// [measured](Self::with_noise).

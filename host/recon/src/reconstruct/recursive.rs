@@ -194,6 +194,7 @@ impl Recursive {
         let RecursiveSettings { noise, strength, .. } = self.settings;
         let base = RegularisedSettings::new(Penalty::Tikhonov);
         let found = regularised(frame, &RegularisedSettings { noise, strength, ..base })?;
+        let noise = of_camera(noise, frame);
         let problem = Problem::of(frame, Basis::Dct, Some(FALLOFF), noise);
         let scale = (1.0 / problem.unit) as f32;
         let mut mean: Vec<f32> = found.image.pixels().iter().map(|v| v * scale).collect();
@@ -212,6 +213,7 @@ impl Recursive {
             poses: VecDeque::from([Pose { since: Shift::default(), known }]),
             shift: Shift::default(),
             noises: VecDeque::from([noise]),
+            noise_is_known: false,
         });
         Ok(RecursiveFrame {
             image: found.image,
@@ -230,7 +232,8 @@ impl Recursive {
 
     /// A frame of the scene of the frames before; `None` if there is a cut.
     fn next(&mut self, mut past: Past, frame: &Measurements) -> Option<RecursiveFrame> {
-        let mut problem = past.problem_of(frame, self.settings.noise);
+        let given = of_camera(self.settings.noise, frame);
+        let mut problem = past.problem_of(frame, given);
         let stay = |past: &Past, noise: f32| Guess {
             shift: Shift::default(),
             mean: past.mean.clone(),
@@ -248,7 +251,7 @@ impl Recursive {
         }
         // The noise comes first: what the past misses beyond it is change of the scene.
         let expected: Vec<&[f32]> = moved.iter().map(|(_, mean)| mean.as_slice()).collect();
-        let noise = past.noise(&problem, &expected, self.settings.noise);
+        let noise = past.noise(&problem, &expected, given);
         problem.prior.noise = noise;
         let view = View::new(&past, &problem, noise, self.settings.speed_px);
         let mut guess = stay(&past, noise);
@@ -303,17 +306,14 @@ impl Recursive {
         let share = past.share_of_last(noise, Some(prior));
         past.mean = past.with_readings(made.clone(), &share);
         let [fused, certain] = past.fused(noise, prior);
-        // Fused values are means of several readings already, so they stay as they are.
-        let known = &past.poses[0].known;
-        if past.poses.len() > 1 {
-            made.clone_from(&past.mean);
-        } else {
-            for (row, precision) in known.precision(noise).into_iter().enumerate() {
-                if precision * noise.powi(2) >= 0.999 {
-                    made[row] = known.value[row];
-                }
+        // Readings at several positions are weighted by the prior alone.
+        let reading_weight = match past.poses.len() {
+            1 => past.weigh(prior, noise, &mut made),
+            _ => {
+                made.clone_from(&past.mean);
+                1.0
             }
-        }
+        };
         let residual = problem.residual_of(&made);
         walsh(past.side, &mut made);
         let unit = past.unit;
@@ -329,10 +329,18 @@ impl Recursive {
             fused,
             certain,
             residual,
-            reading_weight: 1.0,
+            reading_weight,
             noise: f64::from(noise) * unit * side.pixels() as f64,
             strength,
         }
+    }
+}
+
+/// The noise that was asked for, or else what the camera says of the frame's.
+fn of_camera(asked: NoiseLevel, frame: &Measurements) -> NoiseLevel {
+    match (asked, frame.noise()) {
+        (NoiseLevel::Estimated, Some(noise)) => NoiseLevel::Known(noise),
+        _ => asked,
     }
 }
 

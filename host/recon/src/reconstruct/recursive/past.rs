@@ -5,6 +5,7 @@ use super::noise::{self, Missed};
 use super::rows::Spectrum;
 use super::{FALLOFF, LEAST_NOISE};
 use crate::basis::Basis;
+use crate::reconstruct::weight::weigh_each;
 use crate::reconstruct::{NoiseLevel, Problem};
 use crate::{Measurements, Rows, Side};
 use std::collections::VecDeque;
@@ -25,6 +26,8 @@ pub(super) struct Past {
     pub shift: Shift,
     /// The last estimates of the noise.
     pub noises: VecDeque<f32>,
+    /// Whether the noise of the last frame was said, and not estimated.
+    pub noise_is_known: bool,
 }
 
 /// A position of the scene, and the rows that were read there.
@@ -111,9 +114,31 @@ impl Past {
         rows
     }
 
+    /// Replaces the rows of a fit that are known at least as well as by one reading by the weighted means of
+    /// both, and gives the mean weight of what is known. The fit has taken what is known, noise and all: by
+    /// `prior`, the expected square of each row, it is first moved away from that, to where it would be
+    /// without it.
+    pub fn weigh(&self, prior: &[f32], noise: f32, fit: &mut [f32]) -> f64 {
+        let known = &self.poses[0].known;
+        let precision = known.precision(noise);
+        let looks = |row: usize| precision[row] * noise * noise;
+        for (row, fit) in fit.iter_mut().enumerate().filter(|(row, _)| looks(*row) >= 0.999) {
+            *fit -= precision[row] * prior[row] * (known.value[row] - *fit);
+        }
+        let is_read = |row: &u32| looks(*row as usize) >= 0.999;
+        let rows = (0..self.side.area() as u32).filter(is_read).collect();
+        let rows = Rows::trusted(self.side, rows);
+        let reading = |k: usize| {
+            let row = rows[k] as usize;
+            (known.value[row], precision[row].sqrt().recip())
+        };
+        weigh_each(&rows, reading, fit)
+    }
+
     /// The rows that are known nearly as well as by one reading, in the measurements' units; and those
     /// of them that the last position has read, or that are known far better than by `prior`, the
-    /// expected square of each row.
+    /// expected square of each row. If the noise of a reading is known and not estimated, theirs is that of
+    /// their middle row.
     pub fn fused(&self, noise: f32, prior: &[f32]) -> [Measurements; 2] {
         let unit = self.unit * self.side.pixels() as f64;
         let information = self.information(noise);
@@ -125,8 +150,15 @@ impl Past {
         let by_readings = |precision: f32| precision * noise * noise >= LEAST_FUSED;
         let of = |rows: &[usize]| {
             let values = rows.iter().map(|&row| f64::from(values[row]) * unit).collect();
+            let mut known: Vec<f32> = rows.iter().map(|&row| information[row]).collect();
             let rows = rows.iter().map(|&row| row as u32).collect();
-            Measurements::trusted(Rows::trusted(self.side, rows), values)
+            let fused = Measurements::trusted(Rows::trusted(self.side, rows), values);
+            if !self.noise_is_known || known.is_empty() {
+                return fused;
+            }
+            let middle = known.len() / 2;
+            let information = *known.select_nth_unstable_by(middle, f32::total_cmp).1;
+            fused.of_noise(unit / f64::from(information).sqrt())
         };
         let mut rows: Vec<usize> =
             (0..values.len()).filter(|&row| by_readings(information[row])).collect();
@@ -139,7 +171,8 @@ impl Past {
     /// The noise of this frame: given, or the median of the last estimates. `predicted` are the
     /// rows after each motion that is considered.
     pub fn noise(&mut self, problem: &Problem<'_>, predicted: &[&[f32]], given: NoiseLevel) -> f32 {
-        if matches!(given, NoiseLevel::Known(_)) {
+        self.noise_is_known = matches!(given, NoiseLevel::Known(_));
+        if self.noise_is_known {
             return problem.prior.noise.max(LEAST_NOISE);
         }
         // If nothing has moved, the rows themselves are what is expected: the image of a scene
