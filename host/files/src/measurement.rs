@@ -58,7 +58,7 @@ use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
 pub(crate) use opened::{is_reading, read_simulated};
 pub use patterns::{PatternSelection, Patterns};
-pub use plain::{Plain, read_plain};
+pub use plain::{Plain, read_plain, read_plain_all};
 use rayon::prelude::*;
 pub use remedy::Remedy;
 pub use stack::Stack;

@@ -6,8 +6,10 @@ use crate::provenance::made;
 use crate::report::stages;
 use anyhow::Result;
 use nirspi::files::measurement::{PatternSelection, Selection};
-use nirspi::reconstruct::{OwnImage, OwnReport, own_image};
+use nirspi::reconstruct::{OwnImage, own_image, own_images};
+use nirspi::source::Index;
 use nirspi_recon::reconstruct::{MatrixSettings, Method};
+use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -17,11 +19,13 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         field: args.matrix_field.clone(),
         transpose: args.source.transpose,
     };
+    let is_all = args.source.index == Some(Index::All);
+    let index = if is_all { None } else { args.source.one()? };
     let request = OwnImage {
         input: &args.source.input,
         matrix,
         patterns,
-        readings: Selection { index: args.source.one()?, ..args.source.selection()? },
+        readings: Selection { index, ..args.source.selection()? },
         settings: settings(args)?,
         dictionary: args.method.dictionary.as_deref(),
         sampling: args.sampling,
@@ -29,8 +33,16 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         made: made(),
         figure: args.figure.figure,
     };
+    if is_all {
+        let report = spinning(|| own_images(request, stages()))?;
+        return args.report.print(&report, report.pictures.provenance(), |report| {
+            say(args, &report.words(), &report.notes(), &report.pictures)
+        });
+    }
     let report = spinning(|| own_image(request, stages()))?;
-    args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
+    args.report.print(&report, report.pictures.provenance(), |report| {
+        say(args, &report.words(), &report.made.notes, &"image.png")
+    })
 }
 
 fn settings(args: &Args) -> Result<MatrixSettings> {
@@ -52,11 +64,9 @@ fn settings(args: &Args) -> Result<MatrixSettings> {
     })
 }
 
-fn say(args: &Args, report: &OwnReport) -> Result<()> {
-    report.words().iter().try_for_each(print::line)?;
-    print::notes(&report.notes)?;
-    print::line(format_args!(
-        "wrote image.npy, image.png and report.json to {}",
-        args.out.display()
-    ))
+fn say(args: &Args, words: &[String], notes: &[String], pictures: &dyn Display) -> Result<()> {
+    words.iter().try_for_each(print::line)?;
+    print::notes(notes)?;
+    let out = args.out.display();
+    print::line(format_args!("wrote image.npy, {pictures} and report.json to {out}"))
 }
