@@ -1,6 +1,7 @@
 //! The commands that read a file as a guess did.
 
-use crate::files::measurement::{Form, Selection};
+use super::Guess;
+use crate::files::measurement::{Form, Remedy, Selection};
 use crate::files::trace::Cut;
 use crate::provenance::quoted;
 use nirspi_recon::Side;
@@ -61,6 +62,16 @@ pub(super) fn reconstruct(file: &Path, want: &Selection) -> Command {
         .option("--out", "out/")
 }
 
+/// The header of a feed whose readings are read so; `None` if no header says what is done with them.
+pub(super) fn header(guess: &Guess, form: Form, want: &Selection) -> Option<String> {
+    let is_plain = want.remedy == Remedy::default() && !want.transpose;
+    let order = want.shown.as_ref().filter(|_| is_plain)?;
+    let Guess { n, patterns, .. } = guess;
+    let part = (*patterns < n * n).then(|| format!(", \"patterns\": {patterns}"));
+    let (part, form) = (part.unwrap_or_default(), form.name());
+    Some(format!("{{\"n\": {n}, \"order\": \"{order}\"{part}, \"readings\": \"{form}\"}}"))
+}
+
 /// The command that makes readings of a trace.
 pub(super) fn readings(file: &Path, cut: &Cut, out: &Path) -> Command {
     let some = |number: usize| (number > 0).then_some(number);
@@ -78,7 +89,6 @@ pub(super) fn readings(file: &Path, cut: &Cut, out: &Path) -> Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::measurement::Remedy;
     use nirspi_recon::Order;
 
     #[test]

@@ -29,6 +29,8 @@ pub struct OwnImage<'r> {
     pub patterns: PatternSelection,
     /// What the file of the readings does not say.
     pub readings: Selection,
+    /// Whether to make the image of every measurement of the file, instead of the one that `readings` chooses.
+    pub all: bool,
     /// The method, and its settings without a user's own atoms.
     pub settings: MatrixSettings,
     /// A file of a user's own atoms: images of the size of the patterns.
@@ -43,7 +45,7 @@ pub struct OwnImage<'r> {
     pub figure: FigureStyle,
 }
 
-/// The report of such an image.
+/// The report of such an image, or of all of a file.
 #[derive(Debug, Serialize)]
 pub struct OwnReport {
     /// What the image is made of.
@@ -51,25 +53,24 @@ pub struct OwnReport {
     pub of: OwnInput,
     /// How it was made.
     #[serde(flatten)]
-    pub made: OwnMade,
+    pub made: OwnFrames,
     /// What is black and white in the pictures.
     pub pictures: Pictures,
     /// The time of each stage.
     pub stage_ms: StageTimes,
 }
 
-/// The report of the images of all measurements of a file.
+/// One image, or those of all measurements of a file.
 #[derive(Debug, Serialize)]
-pub struct OwnStackReport {
-    /// What the images are made of.
-    #[serde(flatten)]
-    pub of: OwnInput,
-    /// How each was made.
-    pub frames: Vec<OwnMade>,
-    /// What is black and white in the pictures.
-    pub pictures: Pictures,
-    /// The time of each stage.
-    pub stage_ms: StageTimes,
+#[serde(untagged)]
+pub enum OwnFrames {
+    /// One image.
+    One(OwnMade),
+    /// All, in their order.
+    All {
+        /// How each was made.
+        frames: Vec<OwnMade>,
+    },
 }
 
 /// Readings by patterns of a user's own.
@@ -146,46 +147,31 @@ pub enum OwnError {
     },
 }
 
-/// Reconstructs one image and writes it with its pictures and its report.
+/// Reconstructs one image, or the image of every measurement of the file as one stack, and writes it with
+/// its pictures and its report. An image of a stack is the one that its measurement alone gives.
 ///
 /// # Errors
 /// [`OwnError`] names the file and the problem. Nothing is left behind.
 pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnReport, OwnError> {
-    let read = || {
-        read_plain(request.matrix, &request.patterns, request.input, &request.readings)
-            .map(|plain| vec![plain])
+    let OwnImage { input, matrix, patterns, readings, figure, .. } = &request;
+    let read = || match request.all {
+        true => read_plain_all(matrix, patterns, input, readings),
+        false => Ok(vec![read_plain(matrix, patterns, input, readings)?]),
     };
     let plain = times.time("read", read)?;
-    let simulated = plain[0].simulated;
-    let (of, mut all) = images(&request, plain, &mut times)?;
-    let (image, made) = all.remove(0);
-    let provenance = Taken::of_file(request.input, simulated).made(request.made);
-    let pictures = Pictures::of_image(&image, Unit::Readings, None, request.figure, &provenance);
-    let report = OwnReport { of, made, pictures, stage_ms: times };
-    write_image(request.out, &image, None, None, &report.pictures, &report)?;
-    Ok(report)
-}
-
-/// Reconstructs the image of every measurement of the file, and writes them as one stack with its
-/// pictures and its report. Each image is the one that [`own_image`] makes of its measurement.
-///
-/// # Errors
-/// [`OwnError`] names the file and the problem. Nothing is left behind.
-pub fn own_images(
-    request: OwnImage<'_>,
-    mut times: StageTimes,
-) -> Result<OwnStackReport, OwnError> {
-    let read =
-        || read_plain_all(request.matrix, &request.patterns, request.input, &request.readings);
-    let plain = times.time("read", read)?;
-    let simulated = plain[0].simulated;
+    let provenance = Taken::of_file(input, plain[0].simulated).made(request.made);
     let (of, all) = images(&request, plain, &mut times)?;
-    let (images, frames): (Vec<Image<Size>>, Vec<OwnMade>) = all.into_iter().unzip();
-    let provenance = Taken::of_file(request.input, simulated).made(request.made);
-    let named = request.input.display().to_string();
-    let pictures = times.time("pictures", || {
-        Pictures::of_video(&named, &images, Unit::Readings, None, request.figure, &provenance)
-    });
+    let (mut images, mut frames): (Vec<Image<Size>>, Vec<OwnMade>) = all.into_iter().unzip();
+    if !request.all {
+        let (image, made) = (images.remove(0), OwnFrames::One(frames.remove(0)));
+        let pictures = Pictures::of_image(&image, Unit::Readings, None, *figure, &provenance);
+        let report = OwnReport { of, made, pictures, stage_ms: times };
+        write_image(request.out, &image, None, None, &report.pictures, &report)?;
+        return Ok(report);
+    }
+    let named = input.display().to_string();
+    let draw = || Pictures::of_video(&named, &images, Unit::Readings, None, *figure, &provenance);
+    let pictures = times.time("pictures", draw);
     let mut out = OutputDir::create(request.out)?;
     times.time("write", || -> Result<(), FileError> {
         let pixels: Vec<f32> = images.iter().flat_map(Image::pixels).copied().collect();
@@ -193,7 +179,7 @@ pub fn own_images(
         out.write("image.npy", &npy::encode(&shape, &pixels))?;
         pictures.write(&mut out)
     })?;
-    let report = OwnStackReport { of, frames, pictures, stage_ms: times };
+    let report = OwnReport { of, made: OwnFrames::All { frames }, pictures, stage_ms: times };
     out.write("report.json", provenance.sign(&report).unwrap_or_default().as_bytes())?;
     out.commit()?;
     Ok(report)
@@ -317,53 +303,45 @@ impl OwnMade {
 }
 
 impl OwnReport {
-    /// The report in words, a line each: patterns, method.
+    /// The report in words, a line each: patterns, the method, of a stack that of the last image.
     #[must_use]
     pub fn words(&self) -> Vec<String> {
         let OwnInput { input, height, width, patterns, matrix } = &self.of;
         let (input, matrix) = (input.display(), matrix.display());
-        let OwnMade { used, rank, .. } = &self.made;
-        vec![
-            format!(
-                "{input}: {height} x {width}, {used} of {patterns} patterns of {matrix}, rank {rank}"
-            ),
-            self.made.words(),
-        ]
-    }
-}
-
-impl OwnStackReport {
-    /// The report in words, a line each: patterns, the method of the last image.
-    #[must_use]
-    pub fn words(&self) -> Vec<String> {
-        let OwnInput { input, height, width, patterns, matrix } = &self.of;
-        let (input, matrix) = (input.display(), matrix.display());
-        let (count, each) = (self.frames.len(), self.stage_ms.of("reconstruct"));
-        let frames = count_of(count, "frame");
-        let each = each / count as f64;
-        let mut words = vec![format!(
-            "{input}: {frames} of {height} x {width}, {patterns} patterns of {matrix}, {each:.3} ms a frame"
-        )];
-        words.extend(self.frames.last().map(|last| {
-            format!("the last: {} of {patterns} patterns, {}", last.used, last.words())
-        }));
-        words
+        match &self.made {
+            OwnFrames::One(made) => {
+                let OwnMade { used, rank, .. } = made;
+                let of = format!("{used} of {patterns} patterns of {matrix}, rank {rank}");
+                vec![format!("{input}: {height} x {width}, {of}"), made.words()]
+            }
+            OwnFrames::All { frames } => {
+                let each = self.stage_ms.of("reconstruct") / frames.len() as f64;
+                let count = count_of(frames.len(), "frame");
+                let of = format!("{patterns} patterns of {matrix}, {each:.3} ms a frame");
+                let mut words = vec![format!("{input}: {count} of {height} x {width}, {of}")];
+                words.extend(frames.last().map(|last| {
+                    format!("the last: {} of {patterns} patterns, {}", last.used, last.words())
+                }));
+                words
+            }
+        }
     }
 
-    /// The notes of the images: one that all have stands there once.
+    /// The notes for the user: one that all images of a stack have stands there once.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
-        let is_of_all = |note: &&String| self.frames.iter().all(|frame| frame.notes.contains(note));
-        let of_all: Vec<&String> = self
-            .frames
-            .first()
-            .map(|first| first.notes.iter().filter(is_of_all).collect())
-            .unwrap_or_default();
-        let mut notes: Vec<String> = of_all.iter().map(|note| (*note).clone()).collect();
-        for (at, frame) in self.frames.iter().enumerate() {
+        let frames = match &self.made {
+            OwnFrames::One(made) => return made.notes.clone(),
+            OwnFrames::All { frames } => frames,
+        };
+        let Some((first, others)) = frames.split_first() else { return Vec::new() };
+        let is_of_all = |note: &&String| others.iter().all(|frame| frame.notes.contains(note));
+        let of_all: Vec<String> = first.notes.iter().filter(is_of_all).cloned().collect();
+        let own = frames.iter().enumerate().flat_map(|(at, frame)| {
             let own = frame.notes.iter().filter(|note| !of_all.contains(note));
-            notes.extend(own.map(|note| format!("frame {at}: {note}")));
-        }
-        notes
+            own.map(move |note| format!("frame {at}: {note}"))
+        });
+        let own: Vec<String> = own.collect();
+        [of_all, own].concat()
     }
 }

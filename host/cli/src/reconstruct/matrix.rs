@@ -6,10 +6,9 @@ use crate::provenance::made;
 use crate::report::stages;
 use anyhow::Result;
 use nirspi::files::measurement::{PatternSelection, Selection};
-use nirspi::reconstruct::{OwnImage, own_image, own_images};
+use nirspi::reconstruct::{OwnImage, OwnReport, own_image};
 use nirspi::source::Index;
 use nirspi_recon::reconstruct::{MatrixSettings, Method};
-use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -19,13 +18,14 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         field: args.matrix_field.clone(),
         transpose: args.source.transpose,
     };
-    let is_all = args.source.index == Some(Index::All);
-    let index = if is_all { None } else { args.source.one()? };
+    let all = args.source.index == Some(Index::All);
+    let index = if all { None } else { args.source.one()? };
     let request = OwnImage {
         input: &args.source.input,
         matrix,
         patterns,
         readings: Selection { index, ..args.source.selection()? },
+        all,
         settings: settings(args)?,
         dictionary: args.method.dictionary.as_deref(),
         sampling: args.sampling,
@@ -33,16 +33,8 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         made: made(),
         figure: args.figure.figure,
     };
-    if is_all {
-        let report = spinning(|| own_images(request, stages()))?;
-        return args.report.print(&report, report.pictures.provenance(), |report| {
-            say(args, &report.words(), &report.notes(), &report.pictures)
-        });
-    }
     let report = spinning(|| own_image(request, stages()))?;
-    args.report.print(&report, report.pictures.provenance(), |report| {
-        say(args, &report.words(), &report.made.notes, &"image.png")
-    })
+    args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
 }
 
 fn settings(args: &Args) -> Result<MatrixSettings> {
@@ -64,9 +56,9 @@ fn settings(args: &Args) -> Result<MatrixSettings> {
     })
 }
 
-fn say(args: &Args, words: &[String], notes: &[String], pictures: &dyn Display) -> Result<()> {
-    words.iter().try_for_each(print::line)?;
-    print::notes(notes)?;
-    let out = args.out.display();
+fn say(args: &Args, report: &OwnReport) -> Result<()> {
+    report.words().iter().try_for_each(print::line)?;
+    print::notes(&report.notes())?;
+    let (pictures, out) = (&report.pictures, args.out.display());
     print::line(format_args!("wrote image.npy, {pictures} and report.json to {out}"))
 }
