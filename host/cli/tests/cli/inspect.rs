@@ -273,7 +273,7 @@ fn what_is_no_file_of_readings_is_one_line() {
         ("words.txt", &["words.txt", "expected"]),
         ("nan.npy", &["nan.npy", "no finite number"]),
         ("picture.npy", &["a PNG image"]),
-        ("a.tdms", &["a.tdms", "TDMS", "export it as text"]),
+        ("a.tdms", &["a.tdms", "TDMS", "two lines of Python"]),
         ("a.pkl", &["a pickle of Python"]),
         ("a.mcap", &["a.mcap"]),
         ("none.csv", &["none.csv", "no such file"]),

@@ -18,7 +18,7 @@ use zip::{CompressionMethod, ZipWriter};
 pub const LAWS: &[Law] = &[
     Law {
         name: "measurements",
-        reads: "a measurement file as it comes: `.npz`, `.npy`, `.mat`, HDF5, text",
+        reads: "a measurement file as it comes: `.npz`, `.npy`, `.mat`, HDF5, text, `.wav`",
         readers: &[
             "host/files/src/fields.rs",
             "host/files/src/archive.rs",
@@ -27,6 +27,7 @@ pub const LAWS: &[Law] = &[
             "host/files/src/hdf5.rs",
             "host/files/src/text.rs",
             "host/files/src/text/export.rs",
+            "host/files/src/wav.rs",
         ],
         holds: files,
         seeds: file_seeds,
