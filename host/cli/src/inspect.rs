@@ -11,7 +11,7 @@ use std::process::ExitCode;
 
 /// Say what is in a file of readings, and guess the command that reconstructs it
 ///
-/// The command lists the arrays of a .npz, .npy, .mat, .h5, .csv or .txt file, or what a recording (.mcap) holds. Of a feed it
+/// The command lists the arrays of a .npz, .npy, .mat, .h5, .csv, .txt or .wav file, or what a recording (.mcap) holds. Of a feed it
 /// receives some frames, for some seconds, and says whether the readings fit the header. It then reads the readings in each form and order that options of `nirspi reconstruct` name. It ranks these ways: those that keep the law
 /// of light first, then those whose readings predict more of the readings that were held back. A trace and patterns of your
 /// own are named with their command. The best ways are guesses: look at their images (--out).

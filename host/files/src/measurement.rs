@@ -53,7 +53,7 @@ use super::fields::Fields;
 pub use form::Form;
 pub use images::read_images_of;
 pub use named::NamedPatterns;
-use nirspi_recon::law::Claim;
+use nirspi_recon::law::{Claim, Lamp};
 use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
 pub(crate) use opened::{is_reading, read_simulated};
@@ -132,6 +132,8 @@ pub struct MeasurementFile {
     pub not_read: Vec<usize>,
     /// The readings that are an instrument's word for overload, as the file numbers readings.
     pub overloads: Vec<usize>,
+    /// How steady the light was, by readings of the all-on pattern among readings without complements.
+    pub lamp: Option<Lamp>,
     /// What the readings are said to be.
     pub claim: Claim,
     /// What was done with the readings of the file.

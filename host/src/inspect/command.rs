@@ -52,7 +52,7 @@ pub(super) fn reconstruct(file: &Path, want: &Selection) -> Command {
         .flag("--inverted", remedy.inverted)
         .some("--shift", (remedy.shift != 0).then_some(remedy.shift))
         .some("--sweeps", (remedy.sweeps() > 1).then_some(remedy.sweeps))
-        .flag("--divide-by-sums", remedy.divide_by_sums)
+        .flag("--divide-by-lamp", remedy.divide_by_lamp)
         .some("--shown", want.shown.as_ref())
         .some("--side", want.side.map(Side::pixels))
         .flag("--patterns-first", want.patterns_first)
