@@ -265,7 +265,7 @@ mod tests {
     /// A scene's readings in natural order: all patterns, then all complements.
     fn halves() -> Vec<f64> {
         let seen = |row: usize, sign: f64| -> f64 {
-            let lit = |p: &usize| if (row & p).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+            let lit = |p: &usize| if (row & p).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
             let scene = |p: usize| match (p / 16, p % 16) {
                 (3..=8, 5..12) => 1.0,
                 (10..13, 2..7) => 0.5,

@@ -1,6 +1,6 @@
 //! An inspection in words.
 
-use super::{ArrayReport, Guess, Inspection};
+use super::{ArrayReport, FeedSeen, Guess, Inspection};
 use crate::files::provenance::quoted;
 use nirspi_recon::words::count_of;
 
@@ -63,7 +63,7 @@ impl Inspection {
         if let Some(recording) = &self.recording {
             lines.extend(recording.to_string().lines().map(|line| format!("  {line}")));
         }
-        lines.extend(self.feed.iter().flat_map(|feed| feed.words()));
+        lines.extend(self.feed.iter().flat_map(FeedSeen::words));
         for finding in self.findings.iter().chain(&self.unexplained) {
             lines.push(finding.what.clone());
             lines.extend(finding.commands.iter().map(|command| format!("   {command}")));

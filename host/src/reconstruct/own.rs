@@ -6,7 +6,7 @@ use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain, 
 use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
 use crate::picture::{FigureStyle, Pictures, Unit};
-use crate::provenance::{Made, Taken};
+use crate::provenance::{self, Taken};
 use crate::stage_times::StageTimes;
 use nirspi_recon::reconstruct::{
     DarkLevel, MatrixError, MatrixReconstruction, MatrixSettings, Method, MethodSettings,
@@ -40,7 +40,7 @@ pub struct OwnImage<'r> {
     /// Folder for the results.
     pub out: &'r Path,
     /// The program, for the provenance of the results.
-    pub made: &'r Made,
+    pub made: &'r provenance::Made,
     /// What the pictures are made for.
     pub figure: FigureStyle,
 }
@@ -185,13 +185,16 @@ pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnRepo
     Ok(report)
 }
 
+/// An image, and how it was made.
+type Made = (Image<Size>, OwnMade);
+
 /// The images of these readings, all by the same patterns or some of them: what the readings have in
 /// common is found out once.
 fn images(
     request: &OwnImage<'_>,
     plain: Vec<Plain>,
     times: &mut StageTimes,
-) -> Result<(OwnInput, Vec<(Image<Size>, OwnMade)>), OwnError> {
+) -> Result<(OwnInput, Vec<Made>), OwnError> {
     let mut settings = request.settings.clone();
     let size = plain[0].patterns.size;
     if let Some(atoms) = request.dictionary {
@@ -209,7 +212,7 @@ fn images(
         width: size.width(),
         patterns: plain[0].patterns.count,
     };
-    let mut made: Vec<Option<(Image<Size>, OwnMade)>> = plain.iter().map(|_| None).collect();
+    let mut made: Vec<Option<Made>> = plain.iter().map(|_| None).collect();
     for first in 0..plain.len() {
         if made[first].is_some() {
             continue;
@@ -237,7 +240,7 @@ fn same(
     all: &[usize],
     used: usize,
     times: &mut StageTimes,
-) -> Result<Vec<(Image<Size>, OwnMade)>, OwnError> {
+) -> Result<Vec<Made>, OwnError> {
     let refused = |problem| OwnError::Matrix { path: request.matrix.to_owned(), problem };
     let Plain { patterns, places, .. } = &plain[all[0]];
     let kept = patterns.select(&places[..used]);

@@ -173,8 +173,10 @@ fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
             }
         }
         let shape = |(_, line): &Line<'_>| {
+            // A number with a comma is one with a decimal comma.
             let is_number = |word: &str| {
-                !word.is_empty() && (parse(word, '.').is_some() || parse(word, ',').is_some())
+                let decimal = if word.contains(',') { ',' } else { '.' };
+                !word.is_empty() && parse(word, decimal).is_some()
             };
             let mut cells = cells(line, between);
             let mut count = 0;

@@ -37,6 +37,9 @@ struct Made {
 /// Errors on held-back measurements of each trial.
 type Errors = Vec<f64>;
 
+/// An image by OMP, with its number of atoms and why the pursuit stopped.
+type Pursued = (Fit, usize, Stop);
+
 impl<'m> Many<'m> {
     pub(super) fn new(
         own: &'m OwnMatrix,
@@ -200,7 +203,7 @@ impl<'m> Many<'m> {
         let prepared = self.whole(MatrixMethod::Omp)?;
         let wanted = |k: usize| sparsities[k].into_iter().collect();
         let found = self.pursuits(&prepared, which, &noises, wanted)?;
-        let made = |(mut found, noise): (Vec<(Fit, usize, Stop)>, f64)| {
+        let made = |(mut found, noise): (Vec<Pursued>, f64)| {
             let (fit, size, stop) = found.remove(0);
             Made { fit, strength: Some(noise), atoms: Some((size, stop)) }
         };
@@ -214,8 +217,8 @@ impl<'m> Many<'m> {
         which: &[usize],
         noises: &[f64],
         sparsities: impl Fn(usize) -> Vec<usize> + Sync,
-    ) -> Result<Vec<Vec<(Fit, usize, Stop)>>, MatrixError> {
-        let mut found: Vec<Vec<(Fit, usize, Stop)>> = Vec::new();
+    ) -> Result<Vec<Vec<Pursued>>, MatrixError> {
+        let mut found: Vec<Vec<Pursued>> = Vec::new();
         found.resize_with(which.len(), Vec::new);
         let mut different = noises.to_vec();
         different.sort_by(f64::total_cmp);
@@ -261,7 +264,7 @@ impl Trial for Fit {
     }
 }
 
-impl Trial for (Fit, usize, Stop) {
+impl Trial for Pursued {
     fn fit(&self) -> &Fit {
         &self.0
     }
