@@ -46,6 +46,7 @@ mod rows;
 mod sides;
 mod stack;
 mod sweeps;
+mod weighed;
 mod write;
 
 use super::FileError;
@@ -58,12 +59,13 @@ use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
 pub(crate) use opened::{is_reading, read_simulated};
 pub use patterns::{PatternSelection, Patterns};
-pub use plain::{Plain, read_plain, read_plain_all};
+pub use plain::{read_plain, read_plain_all};
 use rayon::prelude::*;
 pub use remedy::Remedy;
 pub use stack::Stack;
 use std::path::Path;
 pub use sweeps::{Sweeps, most_together};
+pub use weighed::Plain;
 pub(crate) use write::READINGS;
 pub use write::{NOISE, PROVENANCE, encode, write_readings};
 

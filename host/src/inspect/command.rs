@@ -1,6 +1,5 @@
 //! The commands that read a file as a guess did.
 
-use super::Guess;
 use crate::files::measurement::{Form, Remedy, Selection};
 use crate::files::trace::Cut;
 use crate::provenance::quoted;
@@ -63,11 +62,10 @@ pub(super) fn reconstruct(file: &Path, want: &Selection) -> Command {
 }
 
 /// The header of a feed whose readings are read so; `None` if no header says what is done with them.
-pub(super) fn header(guess: &Guess, form: Form, want: &Selection) -> Option<String> {
+pub(super) fn header(n: usize, patterns: usize, form: Form, want: &Selection) -> Option<String> {
     let is_plain = want.remedy == Remedy::default() && !want.transpose;
     let order = want.shown.as_ref().filter(|_| is_plain)?;
-    let Guess { n, patterns, .. } = guess;
-    let part = (*patterns < n * n).then(|| format!(", \"patterns\": {patterns}"));
+    let part = (patterns < n * n).then(|| format!(", \"patterns\": {patterns}"));
     let (part, form) = (part.unwrap_or_default(), form.name());
     Some(format!("{{\"n\": {n}, \"order\": \"{order}\"{part}, \"readings\": \"{form}\"}}"))
 }

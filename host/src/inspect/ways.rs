@@ -314,7 +314,7 @@ impl<'t> Trials<'t> {
         let words = (form_words(form, &want, trace), order);
         let guess = Guess::of(&read, verdict, has_rows, words);
         let commands = match self.is_feed {
-            true => command::header(&guess, form, &want).into_iter().collect(),
+            true => command::header(guess.n, guess.patterns, form, &want).into_iter().collect(),
             false => self.commands(trace, &want),
         };
         self.guesses.push(Guess {

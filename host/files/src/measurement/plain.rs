@@ -8,37 +8,11 @@ use super::opened::{is_reading, read_simulated, stated_form};
 use super::patterns::{PatternArray, PatternSelection, Patterns};
 use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings_field};
 use super::sides::{make_pairs, two_fields};
+use super::weighed::{Plain, Which};
 use super::{FileError, Form, Selection};
 use crate::fields::Fields;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Readings of patterns of a user's own.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plain {
-    /// What the readings weigh the light with: all patterns, those that were not read included.
-    pub patterns: Arc<Patterns>,
-    /// The readings, all finite.
-    pub values: Vec<f64>,
-    /// The pattern of each reading.
-    pub places: Vec<usize>,
-    /// Patterns that were not read: the file has NaN, or an instrument's word for overload.
-    pub not_read: Vec<usize>,
-    /// Whether the file says that no real light was measured; `None` if it does not say.
-    pub simulated: Option<bool>,
-    /// What people may not expect, one line each.
-    pub notes: Vec<String>,
-    /// Whether the values may hold a constant dark level.
-    pub dark: bool,
-}
-
-/// Which measurements of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Which {
-    /// That of [`Selection::index`].
-    One,
-    All,
-}
 
 /// Reads patterns from `matrix`, a file, a folder of pictures, or [`NamedPatterns`], and one number for each pattern
 /// from the file `readings`: a reading, from `y` or else from `d`, or the difference of pattern and
