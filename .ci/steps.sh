@@ -333,7 +333,7 @@ step_python() {
     # Not `cargo clippy`, which would check each dependency that the package's build compiles.
     CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo RUSTC_WORKSPACE_WRAPPER=clippy-driver \
         cargo rustc --locked --release --lib --manifest-path host/python/Cargo.toml -- -D warnings
-    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
+    python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 nptdms==1.13.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
     cargo build --locked --release
     (

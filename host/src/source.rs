@@ -481,7 +481,8 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
     }
     let mut warnings: Vec<String> = read.doubts.iter().map(Doubt::to_string).collect();
     warnings.extend(overload_words(&file.overloads));
-    warnings.extend(read.lamp.and_then(|lamp| drift_words(lamp, file.claim)));
+    let lamp = read.lamp.or(file.lamp);
+    warnings.extend(lamp.and_then(|lamp| drift_words(lamp, file.claim)));
     let complex = file.imaginary.is_some();
     let reference = file.reference.map(|Reference { real, imaginary }| {
         match (imaginary, imaginary_of(part, complex)) {
@@ -505,16 +506,16 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         damage: None,
         warnings,
         notes,
-        lamp: read.lamp,
+        lamp,
         flat_field,
     })
 }
 
 /// A warning about a lamp whose drift limits the image.
 fn drift_words(lamp: Lamp, claim: Claim) -> Option<String> {
-    (lamp.limits && !claim.divide_by_sums).then(|| {
+    (lamp.limits && !claim.divide_by_lamp).then(|| {
         format!(
-            "the lamp drifts by {:.1} % over the sweep, which harms the image more than the noise; --divide-by-sums corrects it, \
+            "the lamp drifts by {:.1} % over the sweep, which harms the image more than the noise; --divide-by-lamp corrects it, \
              if there is no ambient light",
             100.0 * lamp.drift
         )

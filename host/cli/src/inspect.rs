@@ -11,16 +11,17 @@ use std::process::ExitCode;
 
 /// Say what is in a file of readings, and guess the command that reconstructs it
 ///
-/// The command lists the arrays of a .npz, .npy, .mat, .h5, .csv or .txt file, or what a recording (.mcap) holds. It then reads
-/// the readings in each form and order that options of `nirspi reconstruct` name. It ranks these ways: those that keep the law
+/// The command lists the arrays of a .npz, .npy, .mat, .h5, .csv, .txt or .wav file, or what a recording (.mcap) holds. Of a feed it
+/// receives some frames, for some seconds, and says whether the readings fit the header. It then reads the readings in each form and order that options of `nirspi reconstruct` name. It ranks these ways: those that keep the law
 /// of light first, then those whose readings predict more of the readings that were held back. A trace and patterns of your
 /// own are named with their command. The best ways are guesses: look at their images (--out).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi inspect wing.npz\n\
-    \x20 nirspi inspect scope.csv --out guesses.png")]
+    \x20 nirspi inspect scope.csv --out guesses.png\n\
+    \x20 nirspi inspect feed:127.0.0.1:5025")]
 pub struct Args {
-    /// The file to inspect
+    /// The file to inspect, or feed:ADDR: live readings (docs/feeds.md)
     #[arg(value_name = "FILE")]
     input: PathBuf,
     /// Picture to write: the images of the best ways, at most four, side by side
@@ -51,7 +52,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         pictures.add(&out.display().to_string(), picture.clone());
         pictures.write_files(existing)?;
     }
-    args.report.print(&found, &provenance, |found| {
+    let code = args.report.print(&found, &provenance, |found| {
         found.words().iter().try_for_each(print::line)?;
         print::notes(&found.notes)?;
         match (&args.out, picture) {
@@ -59,5 +60,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             (Some(_), None) => print::line("no picture: no way to read readings was found"),
             (None, _) => Ok(()),
         }
-    })
+    })?;
+    Ok(if found.is_silent() { ExitCode::FAILURE } else { code })
 }

@@ -15,7 +15,7 @@ use std::process::ExitCode;
 /// Make readings of a trace: samples of a detector that were taken while patterns were shown
 ///
 /// A reading is the mean of the samples of one pattern. A pattern begins where the trigger rises (--trigger), or every K
-/// samples (--samples). The trace is a .npz, .npy, .mat, .h5, .csv or .txt file with the samples in time order, or numbers
+/// samples (--samples). The trace is a .npz, .npy, .mat, .h5, .csv, .txt or .wav file with the samples in time order, or numbers
 /// without a heading (--raw). An array of K samples a reading, (M, K), is a trace, too. The command writes the readings as y in
 /// a .npz file for `nirspi reconstruct`, and beside it a figure of the first readings (OUT.picture.png), which shows where
 /// they begin and end. A pattern whose trigger is missing has no reading (NaN). The number of readings is compared with that

@@ -20,7 +20,7 @@ use nirspi_recon::{Sampling, Size};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Make an image from a measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or a recording (.mcap), or a stack of images
+/// Make an image from a measurement file (.npz, .npy, .mat, .h5, .csv, .txt, .wav) or a recording (.mcap), or a stack of images
 /// from many
 ///
 /// The command writes image.npy (float32, n x n), image.png and report.json. For complex readings it also writes real.npy

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Input")]
 pub struct SourceArgs {
-    /// Measurement file (.npz, .npy, .mat, .h5, .csv, .txt) or recording (.mcap)
+    /// Measurement file (.npz, .npy, .mat, .h5, .csv, .txt, .wav) or recording (.mcap)
     pub input: PathBuf,
     /// Which measurement of a file that holds several: a number from 0, or all. With all, each measurement of a file and
     /// each frame of a recording is one frame of a video; without this option, the frames of a recording are summed
@@ -64,10 +64,10 @@ pub struct SourceArgs {
     /// The file holds K sweeps of the same patterns, one after another, and no h_row. Their mean is used
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     pub sweeps: Option<u32>,
-    /// Divide the difference of each pattern and its complement by their sum, which follows the lamp: against a lamp that
-    /// drifts or flickers. Ambient light makes this correction too weak
+    /// Divide by the lamp's level, against a lamp that drifts or flickers: pairs by the sum of pattern and complement, other
+    /// readings by those of an all-on pattern that is shown again and again. Ambient light makes this correction too weak
     #[arg(long)]
-    pub divide_by_sums: bool,
+    pub divide_by_lamp: bool,
     /// Which part of complex readings to show
     #[arg(long, value_name = "PART", default_value = Part::Magnitude.name(), value_parser = parts())]
     pub part: Part,
@@ -110,7 +110,7 @@ impl SourceArgs {
                 inverted: self.inverted,
                 shift: self.shift,
                 sweeps: self.sweeps.unwrap_or(0),
-                divide_by_sums: self.divide_by_sums,
+                divide_by_lamp: self.divide_by_lamp,
             },
         })
     }

@@ -123,7 +123,25 @@ impl Contents {
     /// # Errors
     /// [`FileError`], one line that names file, what was found and what was expected.
     pub fn open(path: &Path, decimal_comma: bool) -> Result<Self, FileError> {
-        let mut fields = Fields::open(path, decimal_comma)?;
+        Self::of_fields(Fields::open(path, decimal_comma)?, decimal_comma)
+    }
+
+    /// Readings that are in no file; `origin` names where they come from.
+    #[must_use]
+    pub fn of_readings(origin: &Path, readings: Vec<f64>) -> Self {
+        let field = Field { shape: vec![readings.len()], real: readings, imaginary: None };
+        let array = Array {
+            name: String::new(),
+            shape: field.shape.clone(),
+            kind: "numbers".to_owned(),
+            numbers: Some(Look::of(&field)),
+            problem: None,
+        };
+        let fields = Fields::of_array(origin, field);
+        Self { fields, arrays: vec![array], decimal_comma: false }
+    }
+
+    fn of_fields(mut fields: Fields, decimal_comma: bool) -> Result<Self, FileError> {
         let names = match fields.is_unnamed() {
             true => vec![String::new()],
             false => fields.names().to_vec(),

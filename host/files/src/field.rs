@@ -4,7 +4,7 @@ use super::array::to_c_order;
 
 /// The kind of file that a path should lead to, for error messages.
 pub(super) const EXPECTED: &str =
-    "measurements: .npz, .npy, .mat, .h5, .csv or .txt, or a recording (.mcap)";
+    "measurements: .npz, .npy, .mat, .h5, .csv, .txt or .wav, or a recording (.mcap)";
 
 /// Numbers in C order, real or complex.
 #[derive(Debug, Clone, PartialEq)]

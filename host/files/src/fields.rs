@@ -15,6 +15,7 @@ use super::npy;
 use super::plain::{is_mat_4, kind_by_start, open_file};
 use super::stored::Stored;
 use super::text;
+use super::wav;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -39,6 +40,7 @@ pub(super) struct Fields {
     /// What a text has beside its table and is left out, in one line.
     skipped: Option<String>,
     is_text: bool,
+    is_wav: bool,
 }
 
 enum Format {
@@ -63,6 +65,7 @@ impl Fields {
             .read_to_end(&mut start)
             .map_err(|error| FileError::io(path, "read", error))?;
         let (mut skipped, mut is_text) = (None, false);
+        let is_wav = wav::is_start(&start);
         let (names, format) = if start.starts_with(b"PK") {
             let archive = Archive::open(path)?;
             (archive.names().to_vec(), Format::Npz(archive))
@@ -76,6 +79,15 @@ impl Fields {
         } else if is_mat_4(&start) {
             let mat = Mat4::open(path, whole(path, length, "a MATLAB file")?)?;
             (mat.names(), Format::Mat4(mat))
+        } else if is_wav {
+            let mut channels = wav::read(path)?;
+            match channels.len() {
+                1 => (Vec::new(), Format::Unnamed(channels.remove(0))),
+                count => {
+                    let names = (1..=count).map(|channel| channel.to_string());
+                    (names.collect(), Format::Columns(channels))
+                }
+            }
         } else if text::is_start(&start) {
             let text = text::read(path, decimal_comma)?;
             (skipped, is_text) = (text.skipped, true);
@@ -89,11 +101,12 @@ impl Fields {
         } else {
             return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
         };
-        if decimal_comma && !matches!(format, Format::Columns(_) | Format::Unnamed(_)) {
+        let is_of_text = matches!(format, Format::Columns(_) | Format::Unnamed(_)) && !is_wav;
+        if decimal_comma && !is_of_text {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
         let (path, made, called) = (path.to_owned(), Vec::new(), Vec::new());
-        Ok(Self { path, names, format, made, called, skipped, is_text })
+        Ok(Self { path, names, format, made, called, skipped, is_text, is_wav })
     }
 
     /// One array without a name that was made of the file at `path`.
@@ -107,6 +120,7 @@ impl Fields {
             called: Vec::new(),
             skipped: None,
             is_text: false,
+            is_wav: false,
         }
     }
 
@@ -118,9 +132,9 @@ impl Fields {
             _ => return Self::open(&self.path, false),
         };
         let (path, names) = (self.path.clone(), self.names.clone());
-        let (skipped, is_text) = (self.skipped.clone(), self.is_text);
+        let (skipped, is_text, is_wav) = (self.skipped.clone(), self.is_text, self.is_wav);
         let (made, called) = (Vec::new(), Vec::new());
-        Ok(Self { path, names, format, made, called, skipped, is_text })
+        Ok(Self { path, names, format, made, called, skipped, is_text, is_wav })
     }
 
     /// The format, in a few words.
@@ -132,6 +146,7 @@ impl Fields {
             #[cfg(feature = "hdf5")]
             Format::Hdf5(_) => "an HDF5 file",
             _ if self.is_text => "a text table",
+            _ if self.is_wav => "a WAV file",
             Format::Columns(_) | Format::Unnamed(_) => "a NumPy array",
         }
     }
@@ -140,7 +155,7 @@ impl Fields {
     pub(super) fn kind(&mut self, field: &str) -> Option<String> {
         match &mut self.format {
             Format::Npz(archive) => archive.kind(field),
-            Format::Unnamed(_) if !self.is_text => npy::kind(&self.path),
+            Format::Unnamed(_) if !self.is_text && !self.is_wav => npy::kind(&self.path),
             _ => None,
         }
     }
@@ -150,7 +165,8 @@ impl Fields {
         let (names, fields) = fields.into_iter().unzip();
         let (made, called) = (Vec::new(), Vec::new());
         let format = Format::Columns(fields);
-        Self { path: path.to_owned(), names, format, made, called, skipped: None, is_text: false }
+        let (path, skipped, is_text, is_wav) = (path.to_owned(), None, false, false);
+        Self { path, names, format, made, called, skipped, is_text, is_wav }
     }
 
     /// A field that is one text, if the file is a NumPy archive and has it.

@@ -60,6 +60,8 @@ mod stored;
 mod testing;
 #[cfg(not(target_family = "wasm"))]
 mod text;
+#[cfg(not(target_family = "wasm"))]
+mod wav;
 
 pub use error::FileError;
 pub use plain::{read_at_most, read_small, read_small_text, read_text};

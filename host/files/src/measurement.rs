@@ -46,6 +46,7 @@ mod rows;
 mod sides;
 mod stack;
 mod sweeps;
+mod weighed;
 mod write;
 
 use super::FileError;
@@ -53,17 +54,18 @@ use super::fields::Fields;
 pub use form::Form;
 pub use images::read_images_of;
 pub use named::NamedPatterns;
-use nirspi_recon::law::Claim;
+use nirspi_recon::law::{Claim, Lamp};
 use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
 pub(crate) use opened::{is_reading, read_simulated};
 pub use patterns::{PatternSelection, Patterns};
-pub use plain::{Plain, read_plain};
+pub use plain::{read_plain, read_plain_all};
 use rayon::prelude::*;
 pub use remedy::Remedy;
 pub use stack::Stack;
 use std::path::Path;
 pub use sweeps::{Sweeps, most_together};
+pub use weighed::Plain;
 pub(crate) use write::READINGS;
 pub use write::{NOISE, PROVENANCE, encode, write_readings};
 
@@ -132,6 +134,8 @@ pub struct MeasurementFile {
     pub not_read: Vec<usize>,
     /// The readings that are an instrument's word for overload, as the file numbers readings.
     pub overloads: Vec<usize>,
+    /// How steady the light was, by readings of the all-on pattern among readings without complements.
+    pub lamp: Option<Lamp>,
     /// What the readings are said to be.
     pub claim: Claim,
     /// What was done with the readings of the file.

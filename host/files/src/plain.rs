@@ -55,7 +55,10 @@ pub(super) fn read_large_text(path: &Path, expected: &'static str) -> Result<Str
     let bytes = read_bytes(path, expected, MAX_LARGE_TEXT_MIB)?;
     match UTF_16_MARKS.iter().any(|mark| bytes.starts_with(mark)) {
         true => decode(bytes).map_err(|NotText(found)| FileError::kind(path, found, expected)),
-        false => Ok(without_mark(String::from_utf8_lossy(&bytes).into_owned())),
+        false => Ok(without_mark(
+            String::from_utf8(bytes)
+                .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned()),
+        )),
     }
 }
 
@@ -168,8 +171,8 @@ pub(super) fn is_heading<'w>(words: impl Iterator<Item = &'w str> + Clone) -> bo
 }
 
 fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<u8>, FileError> {
-    let (file, _) = open_file(path, expected)?;
-    let mut bytes = Vec::new();
+    let (file, length) = open_file(path, expected)?;
+    let mut bytes = Vec::with_capacity(length.min(most_mib << 20) as usize + 1);
     file.take((most_mib << 20) + 1)
         .read_to_end(&mut bytes)
         .map_err(|error| FileError::io(path, "read", error))?;
@@ -186,7 +189,7 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         return "a MATLAB file";
     }
     if start.starts_with(b"RIFF") && start.get(8..12) == Some(b"WAVE") {
-        return "sound (.wav; save its samples with NumPy)";
+        return "a WAV file";
     }
     const KINDS: &[(&[u8], &str)] = &[
         (b"PK", "a zip archive"),
@@ -197,7 +200,10 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         (b"\x89MCAP", "a recording (MCAP)"),
         (b"MATLAB", "a MATLAB file"),
         (b"\x1f\x8b", "a gzip file (unpack it)"),
-        (b"TDSm", "a TDMS file of LabVIEW (export it as text, or save its array with NumPy)"),
+        (
+            b"TDSm",
+            "a TDMS file of LabVIEW (two lines of Python make an .npz file of it: docs/measurements.md, Traces)",
+        ),
         (b":WFM", "a waveform file of Tektronix (.isf; save it as CSV)"),
         (b"\x0f\x0f:WFM", "a waveform file of Tektronix (.wfm; save it as CSV)"),
         (b"\xf0\xf0:WFM", "a waveform file of Tektronix (.wfm; save it as CSV)"),

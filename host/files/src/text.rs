@@ -10,10 +10,13 @@
 //! line, under a heading with one comma, separates two columns.
 
 mod export;
+#[cfg(test)]
+mod reference;
 
 use super::FileError;
 use super::field::{EXPECTED, Field};
 use super::plain::{is_heading, read_large_text, start_of_text};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Words for a reading that was not taken.
@@ -55,18 +58,14 @@ pub(super) fn is_start(start: &[u8]) -> bool {
 /// Reads a file. With `decimal_comma`, every comma is a decimal comma. A text that is no plain table may
 /// [have one in it](export).
 pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Text, FileError> {
-    let text = read_large_text(path, EXPECTED)?;
+    read_str(path, read_large_text(path, EXPECTED)?, decimal_comma)
+}
+
+/// Reads the text of a file.
+fn read_str(path: &Path, text: String, decimal_comma: bool) -> Result<Text, FileError> {
     // Lines that end as on an old Macintosh.
     let text = if text.contains('\n') { text } else { text.replace('\r', "\n") };
-    let lines: Vec<(usize, &str)> = text
-        .lines()
-        .enumerate()
-        // A tab at the end of a line may close an empty cell.
-        .map(|(at, line)| (at + 1, line.trim_start().trim_end_matches([' ', '\r'])))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', '%']))
-        // Spreadsheets tell each other the separator.
-        .filter(|&(at, line)| at > 1 || !line.to_ascii_lowercase().starts_with("sep="))
-        .collect();
+    let lines = Lines::of(&text);
     let refused = match plain(path, &lines, decimal_comma) {
         Ok(numbers) => return Ok(Text { numbers, skipped: None }),
         Err(error) => error,
@@ -85,41 +84,90 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Text, FileError> 
     Ok(Text { numbers, skipped })
 }
 
+/// A line and its number.
+type Line<'t> = (usize, &'t str);
+
+/// The lines of a text that count, and the text.
+struct Lines<'t> {
+    text: &'t str,
+    lines: Vec<Line<'t>>,
+}
+
+/// Bytes, and lines, that one thread takes at a time.
+const PIECE: usize = 1 << 20;
+const BLOCK: usize = 1 << 14;
+
+impl<'t> Lines<'t> {
+    fn of(text: &'t str) -> Self {
+        let mut pieces = Vec::new();
+        let mut rest = text;
+        while !rest.is_empty() {
+            let from = PIECE.min(rest.len());
+            let end = rest.as_bytes()[from..].iter().position(|&byte| byte == b'\n');
+            // A line end is a character of its own.
+            let (piece, after) = rest.split_at(end.map_or(rest.len(), |end| from + end + 1));
+            pieces.push(piece);
+            rest = after;
+        }
+        let found: Vec<(usize, Vec<Line<'t>>)> =
+            pieces.par_iter().map(|piece| lines_of(piece)).collect();
+        let mut lines = Vec::with_capacity(found.iter().map(|(_, lines)| lines.len()).sum());
+        let mut before = 0;
+        for (count, found) in found {
+            lines.extend(found.into_iter().map(|(at, line)| (before + at, line)));
+            before += count;
+        }
+        // Spreadsheets tell each other the separator.
+        let is_separator = |&(at, line): &Line<'_>| {
+            at == 1 && line.get(..4).is_some_and(|start| start.eq_ignore_ascii_case("sep="))
+        };
+        if lines.first().is_some_and(is_separator) {
+            lines.remove(0);
+        }
+        Self { text, lines }
+    }
+
+    /// Whether one of these lines has this mark.
+    fn have(&self, body: &[Line<'_>], mark: char) -> bool {
+        self.text.contains(mark) && body.iter().any(|(_, line)| line.contains(mark))
+    }
+}
+
+/// Number of the lines of a piece of a text, and those that count, numbered from 1.
+fn lines_of(piece: &str) -> (usize, Vec<Line<'_>>) {
+    let mut count = 0;
+    let mut lines = Vec::new();
+    for line in piece.lines() {
+        count += 1;
+        // A tab at the end of a line may close an empty cell.
+        let line = match is_bare(line) {
+            true => line,
+            false => line.trim_start().trim_end_matches([' ', '\r']),
+        };
+        if !line.is_empty() && !line.starts_with(['#', '%']) {
+            lines.push((count, line));
+        }
+    }
+    (count, lines)
+}
+
 /// The numbers of a plain table: a heading if there is one, and lines of numbers.
-fn plain(path: &Path, lines: &[(usize, &str)], decimal_comma: bool) -> Result<Numbers, FileError> {
-    let wrong = |line: usize, found: String, expected: &str| {
-        FileError::field(path, "table", format!("has {found} in line {line}"), expected)
-    };
-    let names_columns = |(_, line): &(usize, &str)| {
+fn plain(path: &Path, lines: &Lines<'_>, decimal_comma: bool) -> Result<Numbers, FileError> {
+    let names_columns = |(_, line): &Line<'_>| {
         let words = line.split([',', ';', '\t', ' ']).filter(|word| !word.is_empty());
         is_heading(words.clone()) && words.clone().all(|word| parse(word, '.').is_none())
     };
-    let (heading, body) = match lines.split_first() {
+    let (heading, body) = match lines.lines.split_first() {
         Some((first, body)) if names_columns(first) => (Some(first.1), body),
-        _ => (None, lines),
+        _ => (None, &lines.lines[..]),
     };
     if body.is_empty() {
         return Err(FileError::kind(path, "a text file without numbers", EXPECTED));
     }
-    let separators = Separators::of(path, heading, body, decimal_comma)?;
-    let mut rows: Vec<Vec<f64>> = Vec::new();
-    for &(line, content) in body {
-        let row = separators
-            .split(content)
-            .map(|word| {
-                let number = parse(word, separators.decimal);
-                number.ok_or_else(|| wrong(line, format!("{:?}", shortened(word)), "a number"))
-            })
-            .collect::<Result<Vec<f64>, _>>()?;
-        if let Some(first) = rows.first()
-            && first.len() != row.len()
-        {
-            let expected = format!("{} as in the lines before", first.len());
-            return Err(wrong(line, format!("{} numbers", row.len()), &expected));
-        }
-        rows.push(row);
-    }
-    let (height, width) = (rows.len(), rows[0].len());
+    let separators = Separators::of(path, heading, lines, body, decimal_comma)?;
+    let width = separators.split(body[0].1).count();
+    let real = numbers_of(path, body, &separators, width)?;
+    let height = body.len();
     let names: Option<Vec<String>> = heading.map(|heading| {
         separators.split(heading).map(|name| name.trim_matches('"').to_owned()).collect()
     });
@@ -129,17 +177,55 @@ fn plain(path: &Path, lines: &[(usize, &str)], decimal_comma: bool) -> Result<Nu
                 .into_iter()
                 .enumerate()
                 .map(|(at, name)| {
-                    let real = rows.iter().map(|row| row[at]).collect();
+                    let real = real.iter().copied().skip(at).step_by(width).collect();
                     (name, Field { shape: vec![height], real, imaginary: None })
                 })
                 .collect(),
         ),
-        None => Numbers::Table(Field {
-            shape: vec![height, width],
-            real: rows.concat(),
-            imaginary: None,
-        }),
+        None => Numbers::Table(Field { shape: vec![height, width], real, imaginary: None }),
     })
+}
+
+/// The numbers of these lines, `width` in each, one line after another. The error is that of the first line
+/// with one.
+fn numbers_of(
+    path: &Path,
+    body: &[Line<'_>],
+    separators: &Separators,
+    width: usize,
+) -> Result<Vec<f64>, FileError> {
+    let wrong = |line: usize, found: String, expected: &str| {
+        FileError::field(path, "table", format!("has {found} in line {line}"), expected)
+    };
+    let of_block = |lines: &[Line<'_>]| -> Result<Vec<f64>, FileError> {
+        let mut numbers = Vec::with_capacity(lines.len() * width);
+        for &(line, content) in lines {
+            let before = numbers.len();
+            for word in separators.split(content) {
+                match parse(word, separators.decimal) {
+                    Some(number) => numbers.push(number),
+                    None => {
+                        return Err(wrong(line, format!("{:?}", shortened(word)), "a number"));
+                    }
+                }
+            }
+            let found = numbers.len() - before;
+            if found != width {
+                let expected = format!("{width} as in the lines before");
+                return Err(wrong(line, format!("{found} numbers"), &expected));
+            }
+        }
+        Ok(numbers)
+    };
+    // A text that is no plain table shows it in its first lines.
+    let (first, others) = body.split_at(body.len().min(BLOCK));
+    let mut numbers = of_block(first)?;
+    let blocks: Vec<Result<Vec<f64>, FileError>> = others.par_chunks(BLOCK).map(of_block).collect();
+    numbers.reserve_exact(others.len() * width);
+    for block in blocks {
+        numbers.append(&mut block?);
+    }
+    Ok(numbers)
 }
 
 /// The separator between numbers, and the decimal mark.
@@ -156,10 +242,11 @@ impl Separators {
     fn of(
         path: &Path,
         heading: Option<&str>,
-        body: &[(usize, &str)],
+        lines: &Lines<'_>,
+        body: &[Line<'_>],
         decimal_comma: bool,
     ) -> Result<Self, FileError> {
-        let has = |mark: char| body.iter().any(|(_, line)| line.contains(mark));
+        let has = |mark: char| lines.have(body, mark);
         let between = [';', '\t'].into_iter().find(|&mark| has(mark));
         let decimal = |between: Option<char>, decimal| {
             let ends = |mark| body.iter().all(|(_, line)| line.ends_with(mark));
@@ -182,16 +269,16 @@ impl Separators {
                 )),
             };
         }
-        let blanks = body.iter().any(|(_, line)| {
+        let blanks = body.par_iter().with_min_len(BLOCK).any(|(_, line)| {
             // A blank that does not follow a comma separates two numbers.
             line.split_whitespace().rev().skip(1).any(|word| !word.ends_with(','))
         });
         if between.is_some() || blanks {
             return decimal(between, ',');
         }
-        let commas: Vec<usize> = body.iter().map(|(_, line)| line.matches(',').count()).collect();
-        if commas.iter().all(|&count| count <= 1) {
-            let shows_decimals = |(_, line): &(usize, &str)| {
+        let commas = |(_, line): &Line<'_>| line.matches(',').take(2).count();
+        if body.iter().all(|line| commas(line) <= 1) {
+            let shows_decimals = |(_, line): &Line<'_>| {
                 line.split_once(',').is_some_and(|(whole, part)| {
                     let part = part.trim();
                     whole.trim() == "-0"
@@ -199,7 +286,7 @@ impl Separators {
                         || part.len() > 1 && part.starts_with('0')
                 })
             };
-            if commas.contains(&0) || body.iter().any(shows_decimals) {
+            if body.iter().any(|line| commas(line) == 0) || body.iter().any(shows_decimals) {
                 return decimal(None, ',');
             }
             // Two names head two columns.
@@ -216,22 +303,118 @@ impl Separators {
         decimal(Some(','), '.')
     }
 
-    fn split<'l>(&self, line: &'l str) -> impl Iterator<Item = &'l str> + use<'l> {
-        let between = self.between;
-        let closing = between.filter(|_| self.closes);
+    /// The words between separators.
+    fn split<'l>(&self, line: &'l str) -> Words<'l> {
+        let closing = self.between.filter(|_| self.closes);
         let line = closing.map_or(line, |mark| line.strip_suffix(mark).unwrap_or(line));
-        line.split(move |c: char| between.map_or(c.is_whitespace(), |mark| c == mark))
-            .map(str::trim)
-            .filter(move |word| between.is_some() || !word.is_empty())
+        Words::of(line, self.between, false)
     }
+}
+
+/// The words of a line.
+#[derive(Clone)]
+struct Words<'l> {
+    rest: Option<&'l str>,
+    /// The separator; `None` means any blank, and words are never empty.
+    between: Option<char>,
+    /// Whether a separator in quotes separates nothing.
+    quotes: bool,
+    /// Whether bytes tell where words end.
+    is_simple: bool,
+}
+
+impl<'l> Words<'l> {
+    fn of(line: &'l str, between: Option<char>, quotes: bool) -> Self {
+        let quotes = quotes && line.contains('"');
+        let is_simple = between.map_or_else(|| line.is_ascii(), |mark| mark.is_ascii());
+        Self { rest: Some(line), between, quotes, is_simple }
+    }
+
+    /// The length of the first word, and that of the separator after it, if there is one.
+    fn cut(&self, rest: &str) -> Option<(usize, usize)> {
+        let mut quoted = false;
+        if self.is_simple {
+            let is_end = |byte: u8| match self.between {
+                Some(mark) => byte == mark as u8,
+                None => matches!(byte, b'\t'..=b'\r' | b' '),
+            };
+            let at = match self.quotes {
+                false => rest.bytes().position(is_end),
+                true => rest.bytes().position(|byte| {
+                    quoted ^= byte == b'"';
+                    !quoted && is_end(byte)
+                }),
+            };
+            return at.map(|at| (at, 1));
+        }
+        let end = |&(_, c): &(usize, char)| {
+            quoted ^= self.quotes && c == '"';
+            !quoted && self.between.map_or(c.is_whitespace(), |mark| c == mark)
+        };
+        rest.char_indices().find(end).map(|(at, c)| (at, c.len_utf8()))
+    }
+}
+
+impl<'l> Iterator for Words<'l> {
+    type Item = &'l str;
+
+    fn next(&mut self) -> Option<&'l str> {
+        loop {
+            let rest = self.rest?;
+            let word = match self.cut(rest) {
+                None => {
+                    self.rest = None;
+                    rest
+                }
+                Some((length, separator)) => {
+                    self.rest = Some(&rest[length + separator..]);
+                    &rest[..length]
+                }
+            };
+            let word = trimmed(word);
+            if self.between.is_some() || !word.is_empty() {
+                return Some(word);
+            }
+        }
+    }
+}
+
+/// The word without blanks around it.
+fn trimmed(word: &str) -> &str {
+    if is_bare(word) { word } else { word.trim() }
+}
+
+/// Whether a text certainly begins and ends without a blank.
+fn is_bare(text: &str) -> bool {
+    let is_plain = |byte: Option<&u8>| byte.is_some_and(|byte| matches!(byte, b'!'..=b'~'));
+    is_plain(text.as_bytes().first()) && is_plain(text.as_bytes().last())
 }
 
 /// The number that a word states, with the point or comma of its decimals; NaN for a reading that was not
 /// taken, 9.9e37 for one beyond what an instrument measures.
 pub(super) fn parse(word: &str, decimal: char) -> Option<f64> {
-    let word = word.trim_matches('"');
-    if let Some(number) = plain_number(word, decimal) {
-        return Some(number);
+    let bytes = word.as_bytes();
+    let word = match bytes.first() == Some(&b'"') || bytes.last() == Some(&b'"') {
+        true => word.trim_matches('"'),
+        false => word,
+    };
+    plain_number(word, decimal).or_else(|| odd_number(word, decimal))
+}
+
+/// The longest of [`UNREAD`] and [`OVERLOADED`].
+const LONGEST_WORD: usize = 8;
+
+/// What is no plain number.
+#[inline(never)]
+fn odd_number(word: &str, decimal: char) -> Option<f64> {
+    // Most words are none of these.
+    let has_exponent = || word.bytes().any(|byte| matches!(byte, b'd' | b'D'));
+    if word.len() > LONGEST_WORD
+        && word.is_ascii()
+        && !word.starts_with(['n', 'N'])
+        && !has_exponent()
+    {
+        return None;
     }
     let lower = word.to_lowercase();
     if word.is_empty() || UNREAD.contains(&lower.as_str()) {
@@ -251,10 +434,22 @@ pub(super) fn parse(word: &str, decimal: char) -> Option<f64> {
     plain_number(&if is_exponent { plain.replacen('d', "e", 1) } else { plain }, decimal)
 }
 
+/// The longest number with a decimal comma that is read without an allocation.
+const SHORT: usize = 32;
+
 fn plain_number(word: &str, decimal: char) -> Option<f64> {
     match decimal {
         '.' => word.parse().ok(),
         _ if word.contains('.') => None,
+        ',' if word.len() <= SHORT => {
+            let mut bytes = [0; SHORT];
+            let with_point = &mut bytes[..word.len()];
+            with_point.copy_from_slice(word.as_bytes());
+            if let Some(comma) = with_point.iter_mut().find(|byte| **byte == b',') {
+                *comma = b'.';
+            }
+            std::str::from_utf8(with_point).ok()?.parse().ok()
+        }
         _ => word.replacen(decimal, ".", 1).parse().ok(),
     }
 }
@@ -267,12 +462,183 @@ fn shortened(word: &str) -> String {
 mod tests {
     use super::*;
     use crate::testing::{file, line};
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+    use proptest::sample::select;
 
     fn table(content: &str) -> (Vec<usize>, Vec<f64>) {
         let (_folder, path) = file("y.txt", content.as_bytes());
         match read(&path, false).unwrap().numbers {
             Numbers::Table(field) => (field.shape, field.real),
             Numbers::Columns(columns) => panic!("{columns:?}"),
+        }
+    }
+
+    /// A table as bits, because NaN differs from itself; or the refusal.
+    fn seen(read: Result<Text, FileError>) -> String {
+        let bits = |field: &Field| -> Vec<u64> { field.real.iter().map(|v| v.to_bits()).collect() };
+        match read {
+            Err(error) => error.to_string(),
+            Ok(Text { numbers: Numbers::Table(field), skipped }) => {
+                format!("{:?} {:?} {skipped:?}", field.shape, bits(&field))
+            }
+            Ok(Text { numbers: Numbers::Columns(columns), skipped }) => {
+                let columns: Vec<_> =
+                    columns.iter().map(|(name, field)| (name, &field.shape, bits(field))).collect();
+                format!("{columns:?} {skipped:?}")
+            }
+        }
+    }
+
+    const CELLS: [&str; 40] = [
+        "1",
+        "1.5",
+        "-2",
+        "3e-1",
+        "1,5",
+        "0,05",
+        "2,5E-3",
+        "nan",
+        "NaN",
+        "null",
+        "",
+        " ",
+        "#N/A",
+        "-1.#IND",
+        "OL",
+        "overload",
+        "∞",
+        "-∞",
+        "−3",
+        "1.25D+01",
+        "np.float64(1.5)",
+        "\"7\"",
+        "\"a, b\"",
+        "word",
+        "two words",
+        "10:00:01",
+        "1.5.2",
+        "+4",
+        ".5",
+        "inf",
+        "-inf",
+        "d",
+        "1d",
+        "0x10",
+        "1_000",
+        "\u{a0}6",
+        "µV",
+        "(V)",
+        "Volt",
+        "\"",
+    ];
+
+    fn text() -> impl Strategy<Value = String> {
+        let cell = prop_oneof![6 => "[0-9]{1,3}(\\.[0-9]{1,3})?", 1 => select(&CELLS[..]).prop_map(str::to_owned)];
+        let mark = select(&[",", ";", "\t", " ", ", ", ";\t", "  "][..]);
+        let end = select(&["\n", "\r\n", "\r", " \n"][..]);
+        let lines = vec(vec(cell, 1..5), 1..24);
+        let width = prop_oneof![4 => (1_usize..5).prop_map(Some), 1 => Just(None)];
+        let before = vec("[ -~µ]{0,20}", 0..4);
+        (lines, width, mark, end, before, 0_u8..8).prop_map(
+            |(lines, width, mark, end, before, odd)| {
+                let mut text = String::new();
+                if odd & 1 == 1 {
+                    before.iter().for_each(|line| text += &format!("{line}{end}"));
+                }
+                if odd == 6 {
+                    text = format!("sep={mark}{end}{text}");
+                }
+                for cells in lines {
+                    let cells = match width {
+                        Some(width) => cells.iter().cycle().take(width).cloned().collect(),
+                        None => cells,
+                    };
+                    text += &cells.join(mark);
+                    if odd & 2 == 2 {
+                        text += mark;
+                    }
+                    text += end;
+                }
+                text
+            },
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #[test]
+        fn a_text_gives_the_table_of_the_simple_reader(text in text(), decimal_comma: bool) {
+            let path = Path::new("y.csv");
+            let fast = seen(read_str(path, text.clone(), decimal_comma));
+            prop_assert_eq!(fast, seen(reference::read(path, &text, decimal_comma)));
+        }
+    }
+
+    /// Processor time and time of the reader and of the simple one, in MB/s of a text of 100 MB, medians of five in turn:
+    /// `cargo test --release -p nirspi-files --lib text_a_second -- --ignored --nocapture`
+    #[test]
+    #[ignore = "takes minutes, and prints figures"]
+    fn text_a_second() {
+        fn processor_s() -> f64 {
+            let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
+            let fields = stat.rsplit_once(") ").unwrap().1.split(' ');
+            fields.skip(11).take(2).map(|ticks| ticks.parse::<f64>().unwrap() / 100.0).sum()
+        }
+        fn median(mut of: Vec<f64>) -> f64 {
+            of.sort_by(f64::total_cmp);
+            of[of.len() / 2]
+        }
+        let value = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 8) * 1e-5;
+        let one: String = (0..11_000_000).map(|k| format!("{:.4}\n", value(k) % 1000.0)).collect();
+        let row = |k: u32| {
+            let [a, b, c, d] = [1, 2, 3, 4].map(|j| value(k * j) % 10.0);
+            format!("{:.6},{a:.5},{b:.5},{c:.5},{d:.5}\n", f64::from(k) * 1e-6)
+        };
+        let five: String = (0..2_700_000).map(row).collect();
+        let five = format!("Model,X1\nDate,today\n\ntime,CH1,CH2,CH3,CH4\ns,V,V,V,V\n{five}");
+        let path = Path::new("y.csv");
+        for (name, text) in [("one column", one), ("five columns, preamble", five)] {
+            let mut times = [const { Vec::new() }; 4];
+            for _ in 0..5 {
+                for (at, is_fast) in [(0, true), (2, false)] {
+                    let given = text.clone();
+                    let (processor, began) = (processor_s(), std::time::Instant::now());
+                    let found = match is_fast {
+                        true => read_str(path, given, false),
+                        false => reference::read(path, &given, false),
+                    };
+                    times[at + 1].push(began.elapsed().as_secs_f64());
+                    times[at].push(processor_s() - processor);
+                    found.unwrap();
+                }
+            }
+            let megabytes = text.len() as f64 * 1e-6;
+            let [a, b, c, d] = times.map(|times| megabytes / median(times));
+            println!(
+                "{name}, {megabytes:.0} MB: processor {a:.0} MB/s, time {b:.0} MB/s; before {c:.0}, {d:.0}"
+            );
+        }
+    }
+
+    /// Lines of many pieces and blocks, and an error in one of the last.
+    #[test]
+    fn a_long_text_gives_the_table_of_the_simple_reader() {
+        let row = |k: usize| format!("{k},{}.{:02},{}\n", k % 777, k % 100, k * k % 1001);
+        let plain: String = (0..140_000).map(row).collect();
+        assert!(plain.len() > 2 * PIECE);
+        let path = Path::new("y.csv");
+        let wrong = plain.clone() + "1,2\n" + &plain + "x,2,3\n";
+        let word = plain.clone() + "1,two,3\n1,2\n" + &plain;
+        for text in [
+            plain.clone(),
+            format!("# log\nt,a,b\n{plain}"),
+            format!("A meter\nmade: today\n\nt,a,b\n{plain}total,of,all\n"),
+            wrong,
+            word,
+        ] {
+            let simple = seen(reference::read(path, &text, false));
+            assert!(seen(read_str(path, text, false)) == simple, "{simple:.200}");
         }
     }
 

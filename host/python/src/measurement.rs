@@ -66,7 +66,7 @@ pub(crate) struct Options {
     inverted: bool,
     shift: i32,
     sweeps: Option<u32>,
-    divide_by_sums: bool,
+    divide_by_lamp: bool,
     part: String,
     keep_leak: bool,
     no_flat_field: bool,
@@ -97,7 +97,7 @@ impl Options {
                 inverted: self.inverted,
                 shift: self.shift,
                 sweeps: self.sweeps.unwrap_or(0),
-                divide_by_sums: self.divide_by_sums,
+                divide_by_lamp: self.divide_by_lamp,
             },
         };
         Ok(SourceOptions {

@@ -64,7 +64,7 @@ pub fn sheet<'py>(
     let unit = unit(unit_name)?;
     let provenance = Taken::without_camera(Origin::Unknown).made(&made(py)?);
     let png = heavy(py, || {
-        let sheet = Sheet::new(header, n, values.chunks_exact(n * n).collect(), unit);
+        let sheet = Sheet::new(header, (n, n), values.chunks_exact(n * n).collect(), unit);
         Ok(sheet.png(&FigureStyle::Paper.on_screen(), &provenance))
     })?;
     Ok(PyBytes::new(py, &png))

@@ -434,6 +434,9 @@ pub fn reconstruct_matrix<'py>(
     Ok((array(py, pixels), reports))
 }
 
+/// Measurements between two looks whether the program is to stop.
+const TOGETHER: usize = 32;
+
 fn of_matrix(
     size: Size,
     weights: &[f64],
@@ -445,24 +448,26 @@ fn of_matrix(
     let matrix = OwnMatrix::new(size, weights).map_err(refusal)?;
     whole("y", y.len(), matrix.patterns())?;
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
-    for y in y.chunks_exact(matrix.patterns()) {
+    let all: Vec<&[f64]> = y.chunks_exact(matrix.patterns()).collect();
+    for some in all.chunks(TOGETHER) {
         if stop.load(Ordering::Relaxed) {
             return Err(stopped());
         }
-        let made = matrix.reconstruct(y, settings).map_err(refusal)?;
-        pixels.extend_from_slice(made.image.pixels());
-        let (atoms, why) = made.atoms.map(|(atoms, stop)| (atoms, format!("{stop:?}"))).unzip();
-        let method = Method::of_matrix(made.method).unwrap_or(method);
-        let report = serde_json::json!({
-            "method": method.argument(), "used": matrix.patterns(), "order": "as given", "warm": false,
-            "rank": matrix.rank(), "unseen_pixels": matrix.unseen_pixels(),
-            "strength": made.strength, "sparsity": atoms, "stop": why,
-            "dark_level": settings.dark.then_some(made.dark.value()), "note": made.dark.note(),
-            "relative_residual": made.residual,
-            "words": format!("{}, {} patterns of one's own, dark level {:.4}, relative residual {:.3}",
-                             method.name(), matrix.patterns(), made.dark.value(), made.residual),
-        });
-        reports.push(report.to_string());
+        for made in matrix.reconstruct_all(some, settings).map_err(refusal)? {
+            pixels.extend_from_slice(made.image.pixels());
+            let (atoms, why) = made.atoms.map(|(atoms, stop)| (atoms, format!("{stop:?}"))).unzip();
+            let method = Method::of_matrix(made.method).unwrap_or(method);
+            let report = serde_json::json!({
+                "method": method.argument(), "used": matrix.patterns(), "order": "as given", "warm": false,
+                "rank": matrix.rank(), "unseen_pixels": matrix.unseen_pixels(),
+                "strength": made.strength, "sparsity": atoms, "stop": why,
+                "dark_level": settings.dark.then_some(made.dark.value()), "note": made.dark.note(),
+                "relative_residual": made.residual,
+                "words": format!("{}, {} patterns of one's own, dark level {:.4}, relative residual {:.3}",
+                                 method.name(), matrix.patterns(), made.dark.value(), made.residual),
+            });
+            reports.push(report.to_string());
+        }
     }
     Ok((pixels, reports))
 }

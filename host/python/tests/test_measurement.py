@@ -145,6 +145,33 @@ def test_a_trace_is_the_measurement_of_its_readings(tmp_path):
     assert np.allclose(raw.d, of(scene), atol=1e-3)
 
 
+def test_channels_of_a_wav_file_and_of_a_tdms_file_are_traces(tmp_path):
+    scene = asymmetric(N)
+    y = of(scene, split=True)
+    samples = np.concatenate([np.zeros(5), np.repeat(y, 6)])
+    trigger = np.zeros_like(samples)
+    for at in range(3):
+        trigger[5 + at :: 6] = 5.0
+    wavfile = pytest.importorskip("scipy.io.wavfile")
+    wavfile.write(tmp_path / "adc.wav", 48_000, np.stack([samples, trigger], 1).astype(np.float32))
+    m = ns.Measurement.from_trace(tmp_path / "adc.wav", field="1", trigger="2", rows="zig-zag", n=N)
+    assert np.allclose(m.d, of(scene), atol=1e-3)
+    wavfile.write(tmp_path / "d.wav", 48_000, np.rint(1e4 * of(scene)).astype(np.int32))
+    d = ns.load(tmp_path / "d.wav", shown="zig-zag", readings="differences")
+    assert np.allclose(d.d, 1e4 * of(scene), atol=0.51)
+    # As docs/measurements.md says.
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(tmp_path / "adc.tdms") as writer:
+        named = {"ai0": samples, "ai1": trigger}
+        writer.write_segment([nptdms.ChannelObject("group", name, data) for name, data in named.items()])
+    with pytest.raises(ns.Error, match="TDMS file of LabVIEW .two lines of Python"):
+        ns.load(tmp_path / "adc.tdms")
+    channels = nptdms.TdmsFile.read(tmp_path / "adc.tdms")["group"].channels()
+    np.savez(tmp_path / "adc.npz", **{c.name: c[:] for c in channels})
+    t = ns.Measurement.from_trace(tmp_path / "adc.npz", field="ai0", trigger="ai1", rows="zig-zag", n=N)
+    assert np.allclose(t.d, of(scene), atol=1e-9)
+
+
 def test_a_table_in_memory_is_read_as_a_file_of_its_columns(tmp_path):
     scene = asymmetric(N)
     y, rows = of(scene, split=True), ns.order("zig-zag", N)
@@ -273,6 +300,20 @@ def test_parts_and_pickles_are_measurements():
     assert (other.d == m.d).all() and other.n == N
 
 
+def test_all_on_readings_correct_a_lamp_that_drifts(tmp_path):
+    scene = asymmetric(N)
+    rows = np.insert(ns.order("zig-zag", N), np.arange(0, N * N, 8), 0)
+    y = ns.Hadamard(N, rows=ns.order("natural", N), split=True)(scene)[0::2][rows]
+    share = np.linspace(0, 1, len(rows))
+    np.savez(tmp_path / "drifts.npz", n=N, h_row=rows, y=y * (1 + 0.4 * share))
+    options = {"readings": "single", "divide_by_lamp": True}
+    as_it_is = ns.load(tmp_path / "drifts.npz", readings="single")
+    assert any("the lamp drifts by" in note for note in as_it_is.notes)
+    steady, image = scene - scene.mean(), ns.reconstruct(tmp_path / "drifts.npz", **options)
+    assert ns.metrics.correlation(steady, image) > 0.999
+    assert ns.metrics.correlation(steady, ns.reconstruct(as_it_is)) < 0.99
+
+
 def test_sums_of_pairs_correct_a_lamp_that_drifts(tmp_path, random):
     scene = np.add.outer(np.linspace(0, 1, 16) ** 2, np.linspace(0, 2, 16))
     rows = ns.order("zig-zag", 16)
@@ -281,7 +322,7 @@ def test_sums_of_pairs_correct_a_lamp_that_drifts(tmp_path, random):
     np.savez(tmp_path / "drifts.npz", n=16, h_row=rows, y=y * lamp)
     as_it_is = ns.load(tmp_path / "drifts.npz")
     assert any("the lamp drifts by 33" in note for note in as_it_is.notes)
-    corrected = ns.load(tmp_path / "drifts.npz", divide_by_sums=True)
+    corrected = ns.load(tmp_path / "drifts.npz", divide_by_lamp=True)
     assert not any("the lamp drifts" in note for note in corrected.notes)
     steady = ns.Measurement(y=y, rows=rows, n=16)
     seen = np.abs(steady.d) > 1

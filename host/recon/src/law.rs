@@ -27,7 +27,7 @@ mod signed;
 pub use doubt::{Broken, Doubt, Explanation, Extreme};
 pub use dropout::Dropout;
 pub use form::Form;
-pub use lamp::Lamp;
+pub use lamp::{Lamp, LampReadings, Witness};
 pub use outlier::{Impossible, Outlier};
 pub use signed::keeps_the_law;
 
@@ -47,15 +47,15 @@ pub struct Claim {
     /// Whether the side of the image follows from the number of readings alone. Several samples of each
     /// reading, or several sweeps one after another, then look like a larger image.
     pub side_guessed: bool,
-    /// Whether each difference of a pair is divided by the sum of the pair, and multiplied by the median of the sums. It has no
-    /// meaning for other forms.
-    pub divide_by_sums: bool,
+    /// Whether readings are divided by the lamp's level. Each difference of a pair is then divided here by the sum of the
+    /// pair, and multiplied by the median of the sums; readings of other forms were [divided](LampReadings::divided) before.
+    pub divide_by_lamp: bool,
 }
 
 impl From<Form> for Claim {
     /// Readings of this form, of an image whose side is known.
     fn from(form: Form) -> Self {
-        Self { form, side_guessed: false, divide_by_sums: false }
+        Self { form, side_guessed: false, divide_by_lamp: false }
     }
 }
 

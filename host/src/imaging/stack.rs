@@ -336,7 +336,7 @@ impl StackTarget {
             Shown::Many => {
                 let images = values.chunks_exact(side * side).collect();
                 let header = title.to_owned();
-                pictures.sheet(&named, &Sheet::new(header, side, images, Unit::OfWhite));
+                pictures.sheet(&named, &Sheet::new(header, (side, side), images, Unit::OfWhite));
             }
         }
         pictures.write_files(self.existing())?;

@@ -1,6 +1,6 @@
 //! The commands that read a file as a guess did.
 
-use crate::files::measurement::{Form, Selection};
+use crate::files::measurement::{Form, Remedy, Selection};
 use crate::files::trace::Cut;
 use crate::provenance::quoted;
 use nirspi_recon::Side;
@@ -51,7 +51,7 @@ pub(super) fn reconstruct(file: &Path, want: &Selection) -> Command {
         .flag("--inverted", remedy.inverted)
         .some("--shift", (remedy.shift != 0).then_some(remedy.shift))
         .some("--sweeps", (remedy.sweeps() > 1).then_some(remedy.sweeps))
-        .flag("--divide-by-sums", remedy.divide_by_sums)
+        .flag("--divide-by-lamp", remedy.divide_by_lamp)
         .some("--shown", want.shown.as_ref())
         .some("--side", want.side.map(Side::pixels))
         .flag("--patterns-first", want.patterns_first)
@@ -59,6 +59,15 @@ pub(super) fn reconstruct(file: &Path, want: &Selection) -> Command {
         .flag("--decimal-comma", want.decimal_comma)
         .some("--index", want.index)
         .option("--out", "out/")
+}
+
+/// The header of a feed whose readings are read so; `None` if no header says what is done with them.
+pub(super) fn header(n: usize, patterns: usize, form: Form, want: &Selection) -> Option<String> {
+    let is_plain = want.remedy == Remedy::default() && !want.transpose;
+    let order = want.shown.as_ref().filter(|_| is_plain)?;
+    let part = (patterns < n * n).then(|| format!(", \"patterns\": {patterns}"));
+    let (part, form) = (part.unwrap_or_default(), form.name());
+    Some(format!("{{\"n\": {n}, \"order\": \"{order}\"{part}, \"readings\": \"{form}\"}}"))
 }
 
 /// The command that makes readings of a trace.
@@ -78,7 +87,6 @@ pub(super) fn readings(file: &Path, cut: &Cut, out: &Path) -> Command {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::measurement::Remedy;
     use nirspi_recon::Order;
 
     #[test]

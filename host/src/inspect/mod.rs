@@ -9,16 +9,19 @@
 //! (`host/cli/tests/cli/inspect.rs`, `the_first_command_gives_the_image`).
 
 mod command;
+mod feed;
 mod other;
 mod trial;
 mod ways;
 mod words;
 
+pub use feed::FeedSeen;
 pub use other::Finding;
 pub use trial::Guess;
 
 use crate::files::FileError;
 use crate::files::contents::{Array, Contents};
+use crate::files::feed::{Address, FeedError};
 use crate::provenance::Taken;
 use crate::recording::{RecordingError, RecordingInfo};
 use crate::source::{Source, SourceError, SourceOptions};
@@ -46,6 +49,9 @@ pub struct Inspection {
     /// What a recording holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recording: Option<RecordingInfo>,
+    /// What a feed declares and sends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feed: Option<FeedSeen>,
     /// What the file holds beside readings, or instead, with the commands for it.
     pub findings: Vec<Finding>,
     /// What the readings may be if no way fits.
@@ -99,6 +105,25 @@ pub enum InspectError {
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// The words after `feed:` are no address.
+    #[error("{}: {expected}", .path.display())]
+    Address {
+        /// What was found.
+        path: PathBuf,
+        /// What was expected.
+        expected: String,
+    },
+    /// The feed did not begin.
+    #[error(transparent)]
+    Feed(#[from] FeedError),
+    /// The feed sends nothing.
+    #[error("{address}: no data for {seconds} s, expected a header: one JSON line (docs/feeds.md)")]
+    Quiet {
+        /// The address.
+        address: Address,
+        /// For how long nothing came.
+        seconds: u64,
+    },
 }
 
 /// A number in few digits, as JSON has no others than it needs.
@@ -107,11 +132,15 @@ fn rounded<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
 }
 
 impl Inspection {
-    /// Inspects a file of readings or a recording.
+    /// Inspects a file of readings, a recording, or the feed of an address such as `feed:HOST:PORT`.
     ///
     /// # Errors
     /// [`InspectError`], one line that names the file, what was found and what was expected.
     pub fn of(path: &Path) -> Result<Self, InspectError> {
+        if let Some(address) = path.to_str().and_then(|path| path.strip_prefix("feed:")) {
+            let wrong = |expected| InspectError::Address { path: path.to_owned(), expected };
+            return Self::of_feed(&address.parse().map_err(wrong)?);
+        }
         match SourceOptions::default().fits_recording(path) {
             Ok(true) => Self::of_recording(path),
             _ => Self::of_file(path),
@@ -137,6 +166,7 @@ impl Inspection {
             format: "a recording (MCAP)",
             arrays: Vec::new(),
             recording: Some(info),
+            feed: None,
             findings: Vec::new(),
             unexplained: None,
             tried: guesses.len(),
@@ -205,6 +235,7 @@ impl Inspection {
             format: contents.format(),
             arrays: contents.arrays().iter().map(ArrayReport::from).collect(),
             recording: None,
+            feed: None,
             unexplained: other::unexplained(path, &contents, &findings, &guesses),
             findings,
             tried,
@@ -212,6 +243,12 @@ impl Inspection {
             notes,
             taken,
         }
+    }
+
+    /// Whether this is a feed of which no frame has come.
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        self.feed.as_ref().is_some_and(|feed| feed.account.frames == 0)
     }
 
     /// The guesses that explain the readings: better than chance, and not against the law of readings.

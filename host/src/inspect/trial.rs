@@ -65,6 +65,35 @@ pub struct Guess {
 }
 
 impl Guess {
+    /// Readings that were read in this form and order, and what they say. `has_rows`: the patterns are
+    /// named, not one order of many.
+    pub(super) fn of(
+        read: &MeasurementFile,
+        verdict: Verdict,
+        has_rows: bool,
+        (form, order): (String, String),
+    ) -> Self {
+        Self {
+            field: None,
+            form,
+            order,
+            n: verdict.measurements.side().pixels(),
+            patterns: verdict.measurements.rows().len(),
+            readings: read.readings.values().len(),
+            explained: verdict.held_back.confirmed,
+            agreement: verdict.held_back.score,
+            by_chance: verdict.by_chance(has_rows),
+            contradicted: verdict.is_contradicted(),
+            warnings: verdict.warnings(),
+            measurements_in_file: None,
+            mirrored: None,
+            takes_repeats: false,
+            commands: Vec::new(),
+            image: verdict.image,
+            measurements: verdict.measurements,
+        }
+    }
+
     /// Whether the readings fit: they explain each other better than chance and keep the law.
     #[must_use]
     pub fn fits(&self) -> bool {

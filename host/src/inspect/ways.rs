@@ -32,6 +32,8 @@ pub(super) struct Trials<'t> {
     judge: &'t Judge,
     /// Whether the file names the row of each pattern.
     pub(super) has_rows: bool,
+    /// Whether the readings are those of a feed: its header says how they are read.
+    pub(super) is_feed: bool,
     tried: usize,
     visited: Vec<(Option<Cut>, Selection)>,
     guesses: Vec<Guess>,
@@ -55,7 +57,19 @@ impl<'t> Trials<'t> {
         let has_rows = contents.arrays().iter().any(|array| array.name == "h_row");
         let (tried, visited, guesses, several) = (0, Vec::new(), Vec::new(), None);
         let repeated = None;
-        Self { path, contents, judge, has_rows, tried, visited, guesses, several, repeated }
+        let is_feed = false;
+        Self {
+            path,
+            contents,
+            judge,
+            has_rows,
+            is_feed,
+            tried,
+            visited,
+            guesses,
+            several,
+            repeated,
+        }
     }
 
     /// How many ways were tried, and the guesses in their order.
@@ -295,37 +309,37 @@ impl<'t> Trials<'t> {
 
     fn keep(&mut self, trace: Option<&Trace>, tried: Tried) {
         let Tried { want, file: read, verdict, has_rows, mirrored } = tried;
+        let form = want.form.unwrap_or(self.default_form(&want));
+        let order = want.shown.as_ref().map_or_else(|| "of h_row".to_owned(), Order::to_string);
+        let words = (form_words(form, &want, trace), order);
+        let guess = Guess::of(&read, verdict, has_rows, words);
+        let commands = match self.is_feed {
+            true => command::header(guess.n, guess.patterns, form, &want).into_iter().collect(),
+            false => self.commands(trace, &want),
+        };
+        self.guesses.push(Guess {
+            field: match trace {
+                Some(trace) => trace.cut.field.clone(),
+                None => want.field.clone(),
+            },
+            measurements_in_file: want.index.and(self.several),
+            mirrored,
+            takes_repeats: trace.is_some() || want.remedy.sweeps() > 1,
+            commands,
+            ..guess
+        });
+    }
+
+    /// The commands that read the file so.
+    fn commands(&self, trace: Option<&Trace>, want: &Selection) -> Vec<String> {
         let out = trace.map(|trace| trace.out(self.path));
         let file = out.as_deref().unwrap_or(self.path);
         let mut commands = Vec::new();
         if let (Some(trace), Some(out)) = (trace, &out) {
             commands.push(command::readings(self.path, &trace.cut, out).line());
         }
-        commands.push(command::reconstruct(file, &want).line());
-        let field = match trace {
-            Some(trace) => trace.cut.field.clone(),
-            None => want.field.clone(),
-        };
-        let form = want.form.unwrap_or(self.default_form(&want));
-        self.guesses.push(Guess {
-            field,
-            form: form_words(form, &want, trace),
-            order: want.shown.as_ref().map_or_else(|| "of h_row".to_owned(), Order::to_string),
-            n: verdict.measurements.side().pixels(),
-            patterns: verdict.measurements.rows().len(),
-            readings: read.readings.values().len(),
-            explained: verdict.held_back.confirmed,
-            agreement: verdict.held_back.score,
-            by_chance: verdict.by_chance(has_rows),
-            contradicted: verdict.is_contradicted(),
-            warnings: verdict.warnings(),
-            measurements_in_file: want.index.and(self.several),
-            mirrored,
-            takes_repeats: trace.is_some() || want.remedy.sweeps() > 1,
-            commands,
-            image: verdict.image,
-            measurements: verdict.measurements,
-        });
+        commands.push(command::reconstruct(file, want).line());
+        commands
     }
 }
 

@@ -1,6 +1,6 @@
 //! An inspection in words.
 
-use super::{ArrayReport, Guess, Inspection};
+use super::{ArrayReport, FeedSeen, Guess, Inspection};
 use crate::files::provenance::quoted;
 use nirspi_recon::words::count_of;
 
@@ -63,6 +63,7 @@ impl Inspection {
         if let Some(recording) = &self.recording {
             lines.extend(recording.to_string().lines().map(|line| format!("  {line}")));
         }
+        lines.extend(self.feed.iter().flat_map(FeedSeen::words));
         for finding in self.findings.iter().chain(&self.unexplained) {
             lines.push(finding.what.clone());
             lines.extend(finding.commands.iter().map(|command| format!("   {command}")));
@@ -75,16 +76,17 @@ impl Inspection {
         for (at, guess) in shown.iter().enumerate() {
             lines.push(format!("{}. {}: {}", at + 1, guess.name(), guess.explains()));
             lines.extend(guess.warnings.iter().map(|warning| format!("   but {warning}")));
-            lines.extend(guess.commands.iter().map(|command| format!("   {command}")));
+            let header = if self.feed.is_some() { "the header for it: " } else { "" };
+            let commands = guess.commands.iter();
+            lines.extend(commands.map(|command| format!("   {header}{command}")));
             lines.extend(guess.measurements_in_file.map(|count| {
                 format!("   the first of {count} measurements: --index all reconstructs each")
             }));
             let mirrored = guess.mirrored.as_ref();
-            lines.extend(
-                mirrored.map(|order| {
-                    format!("   the image mirrored along its diagonal: --shown {order}")
-                }),
-            );
+            lines.extend(mirrored.map(|order| {
+                let option = if self.feed.is_some() { "order" } else { "--shown" };
+                format!("   the image mirrored along its diagonal: {option} {order}")
+            }));
         }
         let others = self.tried.saturating_sub(shown.len());
         if has_fit && others > 0 {

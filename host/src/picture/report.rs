@@ -141,7 +141,7 @@ impl Pictures {
     #[must_use]
     pub fn of_video(
         header: &str,
-        images: &[Image],
+        images: &[Image<impl Shape>],
         unit: Unit,
         enhanced: Option<(&[f32], Vec<usize>)>,
         style: FigureStyle,
@@ -149,14 +149,14 @@ impl Pictures {
     ) -> Self {
         let mut pictures = Self::new(style, provenance);
         let header = format!("{header}, {} frames", images.len());
-        let side = images[0].side().pixels();
+        let size = video::size_of(&images[0]);
         let values = images.iter().map(Image::pixels).collect();
-        pictures.sheet_and_video("image", &Sheet::new(header.clone(), side, values, unit));
+        pictures.sheet_and_video("image", &Sheet::new(header.clone(), size, values, unit));
         if let Some((values, warned)) = enhanced {
             let area = values.len() / images.len();
-            let each = values.chunks_exact(area).collect();
-            let sheet =
-                Sheet::new(format!("{header}, enhanced"), area.isqrt(), each, Unit::OfWhite);
+            let (each, side) = (values.chunks_exact(area).collect(), area.isqrt());
+            let header = format!("{header}, enhanced");
+            let sheet = Sheet::new(header, (side, side), each, Unit::OfWhite);
             pictures.sheet_and_video("enhanced", &sheet.with_warned(warned));
         }
         pictures
@@ -258,7 +258,7 @@ mod tests {
     fn what_is_left_out_is_said_in_the_report_and_in_words() {
         let values: Vec<f32> = (0..100 * 16).map(|p| (p % 16) as f32).collect();
         let images = values.chunks_exact(16).collect();
-        let sheet = Sheet::new("frames".to_owned(), 4, images, Unit::Readings);
+        let sheet = Sheet::new("frames".to_owned(), (4, 4), images, Unit::Readings);
         let mut pictures = Pictures::new(FigureStyle::Paper, &provenance());
         pictures.sheet_and_video("image", &sheet);
         assert_eq!(pictures.to_string(), "image.png (64 of 100 frames), image.apng");

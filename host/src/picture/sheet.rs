@@ -33,7 +33,8 @@ const VISIBLE_SHARE: f32 = 0.125;
 #[derive(Debug, Clone)]
 pub struct Sheet<'a> {
     header: String,
-    side: usize,
+    /// Height and width of each image.
+    size: (usize, usize),
     images: Vec<&'a [f32]>,
     unit: Unit,
     warned: Vec<usize>,
@@ -47,17 +48,18 @@ enum CommonOrOwn {
 }
 
 impl<'a> Sheet<'a> {
-    /// A sheet of images of `side * side` values each.
+    /// A sheet of images of this height and width.
     ///
     /// All images have one scale. If some images would not be seen on the common scale, each has
     /// its own.
     ///
     /// # Panics
-    /// If an image does not have `side * side` values, at least one.
+    /// If an image has another number of values, or none.
     #[must_use]
-    pub fn new(header: String, side: usize, images: Vec<&'a [f32]>, unit: Unit) -> Self {
-        let whole = images.iter().all(|image| image.len() == side * side);
-        assert!(side > 0 && whole, "images of {side} x {side}");
+    pub fn new(header: String, size: (usize, usize), images: Vec<&'a [f32]>, unit: Unit) -> Self {
+        let (height, width) = size;
+        let whole = images.iter().all(|image| image.len() == height * width);
+        assert!(height > 0 && width > 0 && whole, "images of {height} x {width}");
         let of = |values: &[f32]| Scale::of(Range::Stretched, unit, values.iter().copied());
         let all = images.iter().flat_map(|image| image.iter().copied());
         let common = Scale::of(Range::Stretched, unit, all);
@@ -70,7 +72,7 @@ impl<'a> Sheet<'a> {
             true => CommonOrOwn::Own(own),
             false => CommonOrOwn::Common(common),
         };
-        Self { header, side, images, unit, warned: Vec::new(), scale }
+        Self { header, size, images, unit, warned: Vec::new(), scale }
     }
 
     /// The same sheet, with these images marked as not to be trusted.
@@ -101,8 +103,8 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    pub(super) fn side(&self) -> usize {
-        self.side
+    pub(super) fn size(&self) -> (usize, usize) {
+        self.size
     }
 
     pub(super) fn unit(&self) -> Unit {
@@ -185,9 +187,8 @@ impl<'a> Sheet<'a> {
         let columns = shown.len().clamp(1, most);
         // Few images are not larger than a picture of one.
         let room = (inner + gap) / columns as u32 - gap;
-        let side = self.side as u32;
         let room = room.min(look.single());
-        let (cell, tile) = ((room / side).max(1), (room / side * side).max(room.min(side)));
+        let (high, tile) = self.tile(room);
 
         let header = Block::new(Style::header(look), [self.header.as_str()], inner);
         let labels: Vec<Block> = shown
@@ -206,7 +207,7 @@ impl<'a> Sheet<'a> {
         let rows = shown.len().div_ceil(columns) as u32;
 
         let grid_top = margin + header.height_and(look.px(8));
-        let row_px = tile + look.px(3) + label_px + gap;
+        let row_px = high + look.px(3) + label_px + gap;
         let bar_top = grid_top + rows * row_px;
         let warning_top = bar_top + if has_bar { bar::height(look) + look.px(4) } else { 0 };
         let footer_top = warning_top + spaced(warning.height(), look.px(4));
@@ -220,8 +221,8 @@ impl<'a> Sheet<'a> {
             let border = if warned { look.palette.warning } else { look.palette.frame };
             // A warning is a wider frame.
             let edge = look.px(if warned { 3 } else { 1 }).max(1);
-            self.draw_tile(&mut canvas, index, cell, [left, top, tile, edge], border);
-            labels[at].draw(&mut canvas, left, top + tile + look.px(3));
+            self.draw_tile(&mut canvas, index, [left, top, tile, high], edge, border);
+            labels[at].draw(&mut canvas, left, top + high + look.px(3));
         }
         if let CommonOrOwn::Common(scale) = &self.scale {
             draw_bar(&mut canvas, look, scale, (margin, bar_top), inner.min(look.px(BAR)));
@@ -238,19 +239,31 @@ impl<'a> Sheet<'a> {
         }
     }
 
+    /// Height and width of an image in the picture, neither more than `room`: whole pixels, if the room
+    /// is enough.
+    fn tile(&self, room: u32) -> (u32, u32) {
+        let (height, width) = (self.size.0 as u32, self.size.1 as u32);
+        let longer = height.max(width);
+        match room / longer {
+            0 => ((height * room / longer).max(1), (width * room / longer).max(1)),
+            cell => (height * cell, width * cell),
+        }
+    }
+
     fn draw_tile(
         &self,
         canvas: &mut Drawing,
         index: usize,
-        cell: u32,
-        [left, top, tile, edge]: [u32; 4],
+        at: [u32; 4],
+        edge: u32,
         border: Colour,
     ) {
-        canvas.rect([left - edge, top - edge, tile + 2 * edge, tile + 2 * edge], border);
+        let [left, top, wide, high] = at;
+        canvas.rect([left - edge, top - edge, wide + 2 * edge, high + 2 * edge], border);
         let scale = self.scale_of(index);
         let levels = self.image(index).iter().map(|&v| to_level(scale.level(v))).collect();
-        let (at, columns) = ([left, top, tile, tile], self.side as u32);
-        let smooth = cell * columns != tile;
+        let columns = self.size.1 as u32;
+        let smooth = !wide.is_multiple_of(columns);
         canvas.shapes.push(Shape::Image { at, columns, levels, smooth });
     }
 }
@@ -270,7 +283,7 @@ mod tests {
 
     fn sheet<'a>(header: &str, values: &'a [f32], side: usize) -> Sheet<'a> {
         let images = values.chunks_exact(side * side).collect();
-        Sheet::new(header.to_owned(), side, images, Unit::Readings)
+        Sheet::new(header.to_owned(), (side, side), images, Unit::Readings)
     }
 
     proptest! {

@@ -39,7 +39,7 @@ fn labels_are_never_read_as_an_image() {
         .unwrap_err()
         .to_string();
     assert!(told.contains("a picture of 2 images with labels, expected one image"), "{told}");
-    let sheet = Sheet::new(String::new(), 32, vec![&values; 3], Unit::OfWhite);
+    let sheet = Sheet::new(String::new(), (32, 32), vec![&values; 3], Unit::OfWhite);
     let told = read(&sheet.png(&FigureStyle::Paper.look(), &provenance())).unwrap_err().to_string();
     assert!(told.contains("a picture of 3 images"), "{told}");
 }

@@ -13,7 +13,7 @@ use super::signature::signed;
 use crate::files::image::sign;
 use crate::provenance::Provenance;
 use image::{GenericImageView, RgbImage};
-use nirspi_recon::Image;
+use nirspi_recon::{Image, Shape};
 use rayon::prelude::*;
 
 /// The most frames of a video that is made for itself.
@@ -83,21 +83,34 @@ fn encode(sheet: &Sheet<'_>, most: usize, style: FigureStyle, provenance: &Prove
 
 /// The bytes of a video of these images, all on one scale. There must be at least one image.
 #[must_use]
-pub fn of_images(header: &str, images: &[Image], unit: Unit, provenance: &Provenance) -> Vec<u8> {
-    let side = images.first().map_or(1, |image| image.side().pixels());
+pub fn of_images(
+    header: &str,
+    images: &[Image<impl Shape>],
+    unit: Unit,
+    provenance: &Provenance,
+) -> Vec<u8> {
+    let size = images.first().map_or((1, 1), size_of);
     let values = images.iter().map(Image::pixels).collect();
-    let sheet = Sheet::new(header.to_owned(), side, values, unit);
+    let sheet = Sheet::new(header.to_owned(), size, values, unit);
     encode(&sheet, MOST, FigureStyle::Paper, provenance).bytes
+}
+
+/// Height and width.
+pub(super) fn size_of(image: &Image<impl Shape>) -> (usize, usize) {
+    (image.size().height(), image.size().width())
 }
 
 fn frame(sheet: &Sheet<'_>, index: usize) -> SideBySide {
     let scale = sheet.scale_of(index);
     let title = format!("frame {index}, of 0 to {}", sheet.count() - 1);
     let warning = sheet.is_warned(index).then(|| "a warning stands in the report".to_owned());
+    let (height, width) = sheet.size();
     Panel {
+        width,
+        height,
         range: Range::Fixed(scale.black, scale.white),
         warnings: warning.into_iter().collect(),
-        ..Panel::square(&title, sheet.side(), sheet.image(index), sheet.unit())
+        ..Panel::square(&title, width, sheet.image(index), sheet.unit())
     }
     .into()
 }
@@ -141,7 +154,7 @@ mod tests {
             .map(|gain| (0..64).map(|p| gain * p as f32).collect())
             .collect();
         let images: Vec<&[f32]> = images.iter().map(Vec::as_slice).collect();
-        let sheet = Sheet::new(String::new(), 8, images, Unit::AdcCounts);
+        let sheet = Sheet::new(String::new(), (8, 8), images, Unit::AdcCounts);
         let video = encode(&sheet, MOST, FigureStyle::Paper, &provenance());
         assert_eq!(video.frames, 4);
         let frames = PngDecoder::new(Cursor::new(&video.bytes)).unwrap().apng().unwrap();
@@ -160,10 +173,10 @@ mod tests {
     #[test]
     fn a_video_of_very_many_images_says_how_many_it_leaves_out() {
         assert_eq!(evenly(20_000, MOST).len(), 1000);
-        let many = Sheet::new(String::new(), 2, vec![&[0.0; 4]; 101], Unit::AdcCounts);
+        let many = Sheet::new(String::new(), (2, 2), vec![&[0.0; 4]; 101], Unit::AdcCounts);
         assert_eq!(beside(&many, FigureStyle::Paper, &provenance()).frames, 100);
         let one = vec![0.0; 4];
-        let sheet = Sheet::new(String::new(), 2, vec![&one; 1234], Unit::AdcCounts);
+        let sheet = Sheet::new(String::new(), (2, 2), vec![&one; 1234], Unit::AdcCounts);
         assert_eq!(frame(&sheet, 17).panels[0].title, "frame 17, of 0 to 1233");
     }
 }

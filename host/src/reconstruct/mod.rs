@@ -14,7 +14,7 @@ pub use many::{FileImage, ManyImages, Skipped, file_images, many_images};
 #[cfg(all(feature = "enhance", feature = "pictures"))]
 pub use one::{DropoutReport, OneError, OneImage, OneReport, one_image, write_image};
 #[cfg(all(feature = "enhance", feature = "pictures"))]
-pub use own::{OwnError, OwnImage, OwnReport, own_image};
+pub use own::{OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, own_image};
 pub use solver::{
     Recipe, Solved, Solver, SolverError, check_finite, not_read_words, own_atoms, read_atoms,
 };

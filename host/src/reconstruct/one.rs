@@ -10,7 +10,7 @@ use crate::picture::{FigureStyle, Pictures, Unit};
 use crate::provenance::Made;
 use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
-use nirspi_recon::law::Lamp;
+use nirspi_recon::law::{Lamp, Witness};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Shape, metrics};
 use serde::Serialize;
@@ -48,22 +48,34 @@ pub struct DropoutReport {
 /// How steady the light was.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LampReport {
-    /// Standard deviation of the sums of pattern and complement about their level, as a share of the level.
+    /// Number of all-on readings that say so, of readings without complements; else it is the sums of pattern and
+    /// complement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub all_on_readings: Option<usize>,
+    /// Standard deviation of these about their level, as a share of the level.
     pub spread: f64,
     /// From the lowest to the highest level during the sweep, as a share of the middle one.
     pub drift: f64,
 }
 
 impl LampReport {
-    fn of(Lamp { spread, drift, .. }: Lamp) -> Self {
-        Self { spread, drift }
+    fn of(Lamp { by, spread, drift, .. }: Lamp) -> Self {
+        let all_on_readings = match by {
+            Witness::Sums => None,
+            Witness::AllOn(count) => Some(count),
+        };
+        Self { all_on_readings, spread, drift }
     }
 }
 
 impl fmt::Display for LampReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (spread, drift) = (100.0 * self.spread, 100.0 * self.drift);
-        write!(f, "sums of pairs: spread {spread:.2} %, drift {drift:.2} %")
+        match self.all_on_readings {
+            None => f.write_str("sums of pairs")?,
+            Some(count) => write!(f, "{count} all-on readings")?,
+        }
+        write!(f, ": spread {spread:.2} %, drift {drift:.2} %")
     }
 }
 

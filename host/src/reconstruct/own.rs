@@ -1,18 +1,22 @@
-//! The image of readings by patterns of a user's own, with its pictures and its report, in a folder.
+//! The image of readings by patterns of a user's own, or the images of all readings of a file, with
+//! pictures and a report, in a folder.
 
 use super::{SolverError, check_finite, not_read_words, read_atoms, write_image};
-use crate::files::FileError;
-use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain};
+use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain, read_plain_all};
+use crate::files::output::OutputDir;
+use crate::files::{FileError, npy};
 use crate::picture::{FigureStyle, Pictures, Unit};
-use crate::provenance::{Made, Taken};
+use crate::provenance::{self, Taken};
 use crate::stage_times::StageTimes;
-use nirspi_recon::Sampling;
 use nirspi_recon::reconstruct::{
-    DarkLevel, MatrixError, MatrixSettings, Method, MethodSettings, OwnMatrix, Setting, Sparsity,
+    DarkLevel, MatrixError, MatrixReconstruction, MatrixSettings, Method, MethodSettings,
+    OwnMatrix, Setting, Sparsity,
 };
 use nirspi_recon::words::count_of;
+use nirspi_recon::{Image, Sampling, Size};
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// A request for the image of readings by patterns of a user's own.
@@ -25,6 +29,8 @@ pub struct OwnImage<'r> {
     pub patterns: PatternSelection,
     /// What the file of the readings does not say.
     pub readings: Selection,
+    /// Whether to make the image of every measurement of the file, instead of the one that `readings` chooses.
+    pub all: bool,
     /// The method, and its settings without a user's own atoms.
     pub settings: MatrixSettings,
     /// A file of a user's own atoms: images of the size of the patterns.
@@ -34,14 +40,42 @@ pub struct OwnImage<'r> {
     /// Folder for the results.
     pub out: &'r Path,
     /// The program, for the provenance of the results.
-    pub made: &'r Made,
+    pub made: &'r provenance::Made,
     /// What the pictures are made for.
     pub figure: FigureStyle,
 }
 
-/// The report of such an image.
+/// The report of such an image, or of all of a file.
 #[derive(Debug, Serialize)]
 pub struct OwnReport {
+    /// What the image is made of.
+    #[serde(flatten)]
+    pub of: OwnInput,
+    /// How it was made.
+    #[serde(flatten)]
+    pub made: OwnFrames,
+    /// What is black and white in the pictures.
+    pub pictures: Pictures,
+    /// The time of each stage.
+    pub stage_ms: StageTimes,
+}
+
+/// One image, or those of all measurements of a file.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum OwnFrames {
+    /// One image.
+    One(OwnMade),
+    /// All, in their order.
+    All {
+        /// How each was made.
+        frames: Vec<OwnMade>,
+    },
+}
+
+/// Readings by patterns of a user's own.
+#[derive(Debug, Serialize)]
+pub struct OwnInput {
     /// The file of the readings.
     pub input: PathBuf,
     /// The file of the patterns.
@@ -52,6 +86,11 @@ pub struct OwnReport {
     pub width: usize,
     /// Number of patterns.
     pub patterns: usize,
+}
+
+/// How an image of such readings was made.
+#[derive(Debug, Clone, Serialize)]
+pub struct OwnMade {
     /// Number of patterns used.
     pub used: usize,
     /// Patterns used that are no combination of others.
@@ -82,10 +121,6 @@ pub struct OwnReport {
     pub not_read: Vec<usize>,
     /// Notes for the user.
     pub notes: Vec<String>,
-    /// What is black and white in the pictures.
-    pub pictures: Pictures,
-    /// The time of each stage.
-    pub stage_ms: StageTimes,
 }
 
 fn by_argument<S: Serializer>(method: &Method, to: S) -> Result<S::Ok, S::Error> {
@@ -112,68 +147,139 @@ pub enum OwnError {
     },
 }
 
-/// Reconstructs one image and writes it with its pictures and its report.
+/// Reconstructs one image, or the image of every measurement of the file as one stack, and writes it with
+/// its pictures and its report. An image of a stack is the one that its measurement alone gives.
 ///
 /// # Errors
 /// [`OwnError`] names the file and the problem. Nothing is left behind.
 pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnReport, OwnError> {
-    let OwnImage { input, matrix, mut settings, .. } = request;
-    let read = || read_plain(matrix, &request.patterns, input, &request.readings);
-    let Plain { patterns, values: y, places, not_read, simulated, mut notes, dark } =
-        times.time("read", read)?;
-    settings.dark &= dark;
-    let size = patterns.size;
+    let OwnImage { input, matrix, patterns, readings, figure, .. } = &request;
+    let read = || match request.all {
+        true => read_plain_all(matrix, patterns, input, readings),
+        false => Ok(vec![read_plain(matrix, patterns, input, readings)?]),
+    };
+    let plain = times.time("read", read)?;
+    let provenance = Taken::of_file(input, plain[0].simulated).made(request.made);
+    let (of, all) = images(&request, plain, &mut times)?;
+    let (mut images, mut frames): (Vec<Image<Size>>, Vec<OwnMade>) = all.into_iter().unzip();
+    if !request.all {
+        let (image, made) = (images.remove(0), OwnFrames::One(frames.remove(0)));
+        let pictures = Pictures::of_image(&image, Unit::Readings, None, *figure, &provenance);
+        let report = OwnReport { of, made, pictures, stage_ms: times };
+        write_image(request.out, &image, None, None, &report.pictures, &report)?;
+        return Ok(report);
+    }
+    let named = input.display().to_string();
+    let draw = || Pictures::of_video(&named, &images, Unit::Readings, None, *figure, &provenance);
+    let pictures = times.time("pictures", draw);
+    let mut out = OutputDir::create(request.out)?;
+    times.time("write", || -> Result<(), FileError> {
+        let pixels: Vec<f32> = images.iter().flat_map(Image::pixels).copied().collect();
+        let shape = [images.len(), of.height, of.width];
+        out.write("image.npy", &npy::encode(&shape, &pixels))?;
+        pictures.write(&mut out)
+    })?;
+    let report = OwnReport { of, made: OwnFrames::All { frames }, pictures, stage_ms: times };
+    out.write("report.json", provenance.sign(&report).unwrap_or_default().as_bytes())?;
+    out.commit()?;
+    Ok(report)
+}
+
+/// An image, and how it was made.
+type Made = (Image<Size>, OwnMade);
+
+/// The images of these readings, all by the same patterns or some of them: what the readings have in
+/// common is found out once.
+fn images(
+    request: &OwnImage<'_>,
+    plain: Vec<Plain>,
+    times: &mut StageTimes,
+) -> Result<(OwnInput, Vec<Made>), OwnError> {
+    let mut settings = request.settings.clone();
+    let size = plain[0].patterns.size;
     if let Some(atoms) = request.dictionary {
         settings.atoms = Some(read_atoms(atoms, (size.height(), size.width()))?);
     }
     let most = ((request.sampling.share() * size.area() as f64).round() as usize).max(1);
-    let used = if request.sampling < Sampling::ALL { y.len().min(most) } else { y.len() };
-    let refused = |problem| OwnError::Matrix { path: matrix.to_owned(), problem };
-    let kept = patterns.select(&places[..used]);
-    let own = times.time("rank", || OwnMatrix::new(size, &kept)).map_err(refused)?;
-    let solve = || own.reconstruct(&y[..used], &settings);
-    let found = times.time("reconstruct", solve).map_err(refused)?;
-    check_finite(input, &found.image)?;
+    let shortened = |plain: &Plain| match request.sampling < Sampling::ALL {
+        true => plain.values.len().min(most),
+        false => plain.values.len(),
+    };
+    let of = OwnInput {
+        input: request.input.to_owned(),
+        matrix: request.matrix.to_owned(),
+        height: size.height(),
+        width: size.width(),
+        patterns: plain[0].patterns.count,
+    };
+    let mut made: Vec<Option<Made>> = plain.iter().map(|_| None).collect();
+    for first in 0..plain.len() {
+        if made[first].is_some() {
+            continue;
+        }
+        let used = shortened(&plain[first]);
+        let alike = |at: &usize| {
+            Arc::ptr_eq(&plain[*at].patterns, &plain[first].patterns)
+                && plain[*at].places == plain[first].places
+        };
+        let all: Vec<usize> = (first..plain.len()).filter(alike).collect();
+        settings.dark = request.settings.dark && plain[first].dark;
+        let found = same(request, &settings, &plain, &all, used, times)?;
+        for (at, found) in all.into_iter().zip(found) {
+            made[at] = Some(found);
+        }
+    }
+    Ok((of, made.into_iter().flatten().collect()))
+}
 
-    notes.extend((!not_read.is_empty()).then(|| not_read_words(&not_read)));
-    notes.extend(doubts(&own, used));
-    notes.extend(found.dark.note().map(str::to_owned));
+/// The images of measurements by the same patterns, of which the first `used` are used.
+fn same(
+    request: &OwnImage<'_>,
+    settings: &MatrixSettings,
+    plain: &[Plain],
+    all: &[usize],
+    used: usize,
+    times: &mut StageTimes,
+) -> Result<Vec<Made>, OwnError> {
+    let refused = |problem| OwnError::Matrix { path: request.matrix.to_owned(), problem };
+    let Plain { patterns, places, .. } = &plain[all[0]];
+    let kept = patterns.select(&places[..used]);
+    let own = times.time("rank", || OwnMatrix::new(patterns.size, &kept)).map_err(refused)?;
+    drop(kept);
+    let readings: Vec<&[f64]> = all.iter().map(|&at| &plain[at].values[..used]).collect();
+    let solve = || own.reconstruct_all(&readings, settings);
+    let found = times.time("reconstruct", solve).map_err(refused)?;
     let basis = match request.dictionary {
         Some(path) => path.display().to_string(),
         None => settings.basis.to_string(),
     };
-    let method = Method::of_matrix(found.method).unwrap_or_default();
-    let sparsity = settings.sparsity.map_or(MethodSettings::default().sparsity, Sparsity::Fixed);
-    let provenance = Taken::of_file(input, simulated).made(request.made);
-    let report = OwnReport {
-        input: input.to_owned(),
-        matrix: matrix.to_owned(),
-        height: size.height(),
-        width: size.width(),
-        patterns: patterns.count,
-        used,
-        rank: own.rank(),
-        unseen_pixels: own.unseen_pixels(),
-        method,
-        basis: method.takes(Setting::Basis).then_some(basis),
-        strength: found.strength,
-        sparsity: found.atoms.map(|(size, _)| size),
-        stop: found.atoms.map(|(_, stop)| sparsity.reason(stop)),
-        dark_level: (found.dark != DarkLevel::LeftOut).then_some(found.dark.value()),
-        relative_residual: found.residual,
-        not_read,
-        notes,
-        pictures: Pictures::of_image(
-            &found.image,
-            Unit::Readings,
-            None,
-            request.figure,
-            &provenance,
-        ),
-        stage_ms: times,
+    let asked = settings.sparsity.map_or(MethodSettings::default().sparsity, Sparsity::Fixed);
+    let doubts: Vec<String> = doubts(&own, used).collect();
+    let made = |(&at, found): (&usize, MatrixReconstruction)| {
+        check_finite(request.input, &found.image)?;
+        let Plain { not_read, notes, .. } = &plain[at];
+        let mut notes = notes.clone();
+        notes.extend((!not_read.is_empty()).then(|| not_read_words(not_read)));
+        notes.extend(doubts.iter().cloned());
+        notes.extend(found.dark.note().map(str::to_owned));
+        let method = Method::of_matrix(found.method).unwrap_or_default();
+        let made = OwnMade {
+            used,
+            rank: own.rank(),
+            unseen_pixels: own.unseen_pixels(),
+            method,
+            basis: method.takes(Setting::Basis).then(|| basis.clone()),
+            strength: found.strength,
+            sparsity: found.atoms.map(|(size, _)| size),
+            stop: found.atoms.map(|(_, stop)| asked.reason(stop)),
+            dark_level: (found.dark != DarkLevel::LeftOut).then_some(found.dark.value()),
+            relative_residual: found.residual,
+            not_read: not_read.clone(),
+            notes,
+        };
+        Ok((found.image, made))
     };
-    write_image(request.out, &found.image, None, None, &report.pictures, &report)?;
-    Ok(report)
+    all.iter().zip(found).map(made).collect()
 }
 
 /// What patterns leave open.
@@ -186,26 +292,59 @@ fn doubts(own: &OwnMatrix, used: usize) -> impl Iterator<Item = String> {
     others.into_iter().chain(unseen)
 }
 
-impl OwnReport {
-    /// The report in words, a line each: patterns, method.
-    #[must_use]
-    pub fn words(&self) -> Vec<String> {
-        let Self { input, height, width, used, patterns, matrix, rank, .. } = self;
-        let (input, matrix) = (input.display(), matrix.display());
+impl OwnMade {
+    /// The method in words.
+    fn words(&self) -> String {
         let strength = self.strength.map(|t| format!(", strength {t}")).unwrap_or_default();
         let atoms = self.sparsity.map(|k| format!(", {}", count_of(k, "atom"))).unwrap_or_default();
         let basis = self.basis.as_ref().map(|b| format!(", {b} basis")).unwrap_or_default();
         let dark =
             self.dark_level.map(|level| format!(", dark level {level:.4}")).unwrap_or_default();
-        vec![
-            format!(
-                "{input}: {height} x {width}, {used} of {patterns} patterns of {matrix}, rank {rank}"
-            ),
-            format!(
-                "{}{basis}{atoms}{strength}{dark}, relative residual {:.3}",
-                self.method.name(),
-                self.relative_residual
-            ),
-        ]
+        let (method, residual) = (self.method.name(), self.relative_residual);
+        format!("{method}{basis}{atoms}{strength}{dark}, relative residual {residual:.3}")
+    }
+}
+
+impl OwnReport {
+    /// The report in words, a line each: patterns, the method, of a stack that of the last image.
+    #[must_use]
+    pub fn words(&self) -> Vec<String> {
+        let OwnInput { input, height, width, patterns, matrix } = &self.of;
+        let (input, matrix) = (input.display(), matrix.display());
+        match &self.made {
+            OwnFrames::One(made) => {
+                let OwnMade { used, rank, .. } = made;
+                let of = format!("{used} of {patterns} patterns of {matrix}, rank {rank}");
+                vec![format!("{input}: {height} x {width}, {of}"), made.words()]
+            }
+            OwnFrames::All { frames } => {
+                let each = self.stage_ms.of("reconstruct") / frames.len() as f64;
+                let count = count_of(frames.len(), "frame");
+                let of = format!("{patterns} patterns of {matrix}, {each:.3} ms a frame");
+                let mut words = vec![format!("{input}: {count} of {height} x {width}, {of}")];
+                words.extend(frames.last().map(|last| {
+                    format!("the last: {} of {patterns} patterns, {}", last.used, last.words())
+                }));
+                words
+            }
+        }
+    }
+
+    /// The notes for the user: one that all images of a stack have stands there once.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let frames = match &self.made {
+            OwnFrames::One(made) => return made.notes.clone(),
+            OwnFrames::All { frames } => frames,
+        };
+        let Some((first, others)) = frames.split_first() else { return Vec::new() };
+        let is_of_all = |note: &&String| others.iter().all(|frame| frame.notes.contains(note));
+        let of_all: Vec<String> = first.notes.iter().filter(is_of_all).cloned().collect();
+        let own = frames.iter().enumerate().flat_map(|(at, frame)| {
+            let own = frame.notes.iter().filter(|note| !of_all.contains(note));
+            own.map(move |note| format!("frame {at}: {note}"))
+        });
+        let own: Vec<String> = own.collect();
+        [of_all, own].concat()
     }
 }

@@ -7,6 +7,7 @@ use crate::report::stages;
 use anyhow::Result;
 use nirspi::files::measurement::{PatternSelection, Selection};
 use nirspi::reconstruct::{OwnImage, OwnReport, own_image};
+use nirspi::source::Index;
 use nirspi_recon::reconstruct::{MatrixSettings, Method};
 use std::path::Path;
 use std::process::ExitCode;
@@ -17,11 +18,14 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         field: args.matrix_field.clone(),
         transpose: args.source.transpose,
     };
+    let all = args.source.index == Some(Index::All);
+    let index = if all { None } else { args.source.one()? };
     let request = OwnImage {
         input: &args.source.input,
         matrix,
         patterns,
-        readings: Selection { index: args.source.one()?, ..args.source.selection()? },
+        readings: Selection { index, ..args.source.selection()? },
+        all,
         settings: settings(args)?,
         dictionary: args.method.dictionary.as_deref(),
         sampling: args.sampling,
@@ -54,9 +58,7 @@ fn settings(args: &Args) -> Result<MatrixSettings> {
 
 fn say(args: &Args, report: &OwnReport) -> Result<()> {
     report.words().iter().try_for_each(print::line)?;
-    print::notes(&report.notes)?;
-    print::line(format_args!(
-        "wrote image.npy, image.png and report.json to {}",
-        args.out.display()
-    ))
+    print::notes(&report.notes())?;
+    let (pictures, out) = (&report.pictures, args.out.display());
+    print::line(format_args!("wrote image.npy, {pictures} and report.json to {out}"))
 }

@@ -197,7 +197,7 @@ fn patterns_of_the_bench_are_recorded_and_shown_by_their_matrix() {
     let capture = ["capture", "--camera", "feed:log.txt", "--frames", "2", "--out", "rec.npz"];
     let said = bench.run(&capture).succeeded().stdout;
     assert!(said.contains("3 x 4, 12 patterns of its own, readings pairs"), "{said}");
-    let advice = "nirspi reconstruct rec.npz --index 0 --matrix PATTERNS --size 3x4 makes images";
+    let advice = "nirspi reconstruct rec.npz --index all --matrix PATTERNS --size 3x4 makes images";
     assert!(said.contains(advice), "{said}");
     let rows: String = (0..12)
         .map(|at| (0..12).map(|k| if k == at { "1 " } else { "0 " }).collect::<String>() + "\n")

@@ -182,21 +182,77 @@ fn the_sums_of_pairs_tell_and_correct_a_lamp_that_drifts() {
     assert!(lamp["drift"].as_f64().unwrap() < 0.01, "{lamp}");
     let (harmed, told, lamp) = image("drifts.npz", &[]);
     let words = "the lamp drifts by 33.";
-    assert!(told.stderr.contains(words) && told.stderr.contains("--divide-by-sums"), "{told:?}");
+    assert!(told.stderr.contains(words) && told.stderr.contains("--divide-by-lamp"), "{told:?}");
     assert!((lamp["drift"].as_f64().unwrap() - 0.333).abs() < 0.01, "{lamp}");
-    let (corrected, told, _) = image("drifts.npz", &["--divide-by-sums"]);
+    let (corrected, told, _) = image("drifts.npz", &["--divide-by-lamp"]);
     assert!(told.stderr.is_empty(), "{told:?}");
     let (before, after) = (correlation(&harmed, &truth), correlation(&corrected, &truth));
     assert!(after > 0.9999 && before < after - 1e-3, "{before} {after}");
     bench
-        .run(&["reconstruct", "steady.npz", "--readings", "single", "--divide-by-sums"])
+        .run(&["reconstruct", "steady.npz", "--readings", "single", "--divide-by-lamp"])
         .failed(1, &["expected (256,) or"]);
     let d: Vec<f32> = measured.y.chunks_exact(2).map(|pair| pair[0] - pair[1]).collect();
     bench.write("d.npy", &encode(&[d.len()], &d));
     let line = ["reconstruct", "d.npy", "--shown", "natural", "--readings", "differences"];
-    bench
-        .run(&[&line[..], &["--divide-by-sums"]].concat())
-        .failed(1, &["holds no complements (differences)", "with --divide-by-sums"]);
+    bench.run(&[&line[..], &["--divide-by-lamp"]].concat()).failed(
+        1,
+        &["holds no complements (differences) and 1 all-on reading", "at least 4 times"],
+    );
+}
+
+/// Readings without complements, with the all-on pattern in each 16th place, under a lamp of known drift and flicker.
+#[test]
+fn readings_of_the_all_on_pattern_tell_and_correct_a_lamp_that_drifts() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let (mut rows, mut steady) = (Vec::new(), Vec::new());
+    for (pair, &row) in measured.y.chunks_exact(2).zip(&measured.h_row) {
+        if rows.len() % 16 == 0 {
+            let on = measured.h_row.iter().position(|&row| row == 0.0).unwrap();
+            rows.push(0.0);
+            steady.push(measured.y[2 * on]);
+        }
+        rows.push(row);
+        steady.push(pair[0]);
+    }
+    let count = steady.len();
+    let lamp = |at: usize| {
+        let share = at as f32 / count as f32;
+        1.0 + 0.4 * share + 0.05 * (20.0 * share).sin()
+    };
+    let drifts: Vec<f32> = (0..count).map(|at| steady[at] * lamp(at)).collect();
+    let side = [measured.n as f32];
+    for (name, y) in [("steady.npz", &steady), ("drifts.npz", &drifts)] {
+        bench.write(
+            name,
+            &npz(&[("n", &[1], &side), ("h_row", &[count], &rows), ("y", &[count], y)]),
+        );
+    }
+    let image = |file: &str, more: &[&str]| {
+        let line = ["reconstruct", file, "--readings", "single", "--method", "hadamard"];
+        let told = bench.run(&[&line[..], more].concat()).succeeded();
+        let lamp = bench.json("out/report.json")["lamp"].clone();
+        (bench.pixels("out/image.npy"), told, lamp)
+    };
+    let (truth, told, lamp) = image("steady.npz", &[]);
+    assert!(told.stdout.contains("all-on readings: spread 0.00 %, drift 0.00 %"), "{told:?}");
+    assert!(told.stderr.is_empty(), "{told:?}");
+    assert_eq!(lamp["all_on_readings"], 19, "{lamp}");
+    let (harmed, told, lamp) = image("drifts.npz", &[]);
+    let words = ["the lamp drifts by 3", "--divide-by-lamp"];
+    assert!(words.iter().all(|words| told.stderr.contains(words)), "{told:?}");
+    assert!((lamp["drift"].as_f64().unwrap() - 0.33).abs() < 0.04, "{lamp}");
+    let (corrected, told, _) = image("drifts.npz", &["--divide-by-lamp"]);
+    assert!(told.stderr.is_empty(), "{told:?}");
+    // On the scale of the truth: readings are those of the lamp's middle level.
+    let psnr = |found: &[f32]| {
+        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+        let scale = dot(found, &truth) / dot(found, found);
+        let found: Vec<f32> = found.iter().map(|pixel| scale * pixel).collect();
+        let range = truth.iter().copied().fold(0.0, f32::max);
+        nirspi_recon::metrics::psnr(&truth, &found, 16, 16, range.into()).unwrap()
+    };
+    let (before, after) = (psnr(&harmed), psnr(&corrected));
+    assert!(before < 20.0 && after > before + 15.0, "{before} dB, {after} dB corrected");
 }
 
 #[test]

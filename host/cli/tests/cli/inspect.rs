@@ -273,7 +273,7 @@ fn what_is_no_file_of_readings_is_one_line() {
         ("words.txt", &["words.txt", "expected"]),
         ("nan.npy", &["nan.npy", "no finite number"]),
         ("picture.npy", &["a PNG image"]),
-        ("a.tdms", &["a.tdms", "TDMS", "export it as text"]),
+        ("a.tdms", &["a.tdms", "TDMS", "two lines of Python"]),
         ("a.pkl", &["a pickle of Python"]),
         ("a.mcap", &["a.mcap"]),
         ("none.csv", &["none.csv", "no such file"]),
@@ -387,4 +387,37 @@ fn a_simulated_file_is_called_simulated() {
     bench.run(&["example", "wing", "--out", "wing.npz"]).succeeded();
     let report = bench.run(&["inspect", "wing.npz", "--json"]).succeeded().json();
     assert_eq!(report["provenance"]["origin"], "simulated");
+}
+
+/// The readings of a feed, and what its header should say.
+#[test]
+fn a_feed_is_judged_by_its_header_and_its_readings() {
+    let (bench, natural) = (Bench::new(), Natural::new());
+    let header = |form| format!("{{\"n\":16,\"order\":\"natural\",\"readings\":\"{form}\"}}\n");
+    let numbers = |readings: &[f32]| -> String {
+        readings.iter().map(|reading| format!("{reading}\n")).collect::<String>().repeat(3)
+    };
+    let halves = [&natural.on[..], &natural.off].concat();
+    bench.write("right.txt", (header("pairs") + &numbers(&natural.y)).as_bytes());
+    bench.write("wrong.txt", (header("pairs") + &numbers(&halves)).as_bytes());
+    let said = bench.run(&["inspect", "feed:right.txt"]).succeeded().stdout;
+    assert!(said.contains("3 frames, all there before"), "{said}");
+    assert!(!said.contains("the header breaks the law of light"), "{said}");
+    let report = bench.run(&["inspect", "feed:right.txt", "--json"]).succeeded().json();
+    assert_eq!(report["feed"]["declared"]["contradicted"], false, "{report}");
+    let said = bench.run(&["inspect", "feed:wrong.txt", "--out", "ways.png"]).succeeded().stdout;
+    let warning = "the header breaks the law of light; they fit halves, order natural, 16 x 16";
+    let better = r#"the header for it: {"n": 16, "order": "natural", "readings": "halves"}"#;
+    assert!(said.contains(warning) && said.contains(better), "{said}");
+    assert!(said.contains("wrote ways.png"), "{said}");
+    // What is no feed, and what sends no frame.
+    bench.write("none.txt", b"1 2 3\n");
+    bench.run(&["inspect", "feed:none.txt"]).failed(1, &["feed:none.txt", "one JSON line"]);
+    bench.run(&["inspect", "feed:"]).failed(1, &["expected feed:HOST:PORT"]);
+    bench.run(&["inspect", "feed:gone.txt"]).failed(1, &["no such file, pipe or socket"]);
+    bench.write("begun.txt", (header("pairs") + "1 2 3\n").as_bytes());
+    let said = bench.run(&["inspect", "feed:begun.txt"]);
+    assert!(said.stdout.contains("s after 3 of 512 readings"), "{said:?}");
+    assert!(said.stdout.contains("no data for "), "{said:?}");
+    assert_eq!(said.code, Some(1), "{said:?}");
 }

@@ -253,6 +253,74 @@ fn patterns_come_in_any_size_and_form() {
     assert!(correlation(&bench.pixels("out/image.npy"), &scene) > 0.9);
 }
 
+/// All measurements of a file in one step: each image is the one that its measurement alone gives.
+#[test]
+fn all_measurements_of_a_file_become_one_stack() {
+    let bench = Bench::new();
+    let (scene, weights, y) = of_size(12, 15, 160);
+    let mut frames: Vec<f32> =
+        [1.0, -0.5, 3.0].iter().flat_map(|g| y.iter().map(move |y| g * y)).collect();
+    // The second one lacks two patterns.
+    frames[160 + 7] = f32::NAN;
+    frames[160 + 90] = f32::NAN;
+    bench.write("y.npy", &npy::encode(&[3, 160], &frames));
+    bench.write("phi.npy", &npy::encode(&[160, 12, 15], &weights));
+    for method in ["auto", "tikhonov", "omp"] {
+        let line = ["reconstruct", "y.npy", "--matrix", "phi.npy", "--method", method, "--index"];
+        let said = bench.run(&[&line[..], &["all", "--out", "all"]].concat()).succeeded().stdout;
+        assert!(said.contains("y.npy: 3 frames of 12 x 15, 160 patterns of phi.npy"), "{said}");
+        assert!(
+            said.contains("note: frame 1: not read: 2 patterns left out, at [7, 90]"),
+            "{said}"
+        );
+        let all = bench.pixels("all/image.npy");
+        let report = bench.json("all/report.json");
+        for (k, image) in all.chunks_exact(180).enumerate() {
+            bench.run(&[&line[..], &[&k.to_string(), "--out", "one"]].concat()).succeeded();
+            assert_eq!(image, bench.pixels("one/image.npy"), "{method}, frame {k}");
+            let one = bench.json("one/report.json");
+            for key in
+                ["used", "rank", "method", "strength", "not_read", "relative_residual", "notes"]
+            {
+                assert_eq!(report["frames"][k][key], one[key], "{method}, frame {k}: {key}");
+            }
+        }
+        assert_eq!(report["frames"][1]["used"], 158);
+        assert!(correlation(&all[..180], &scene) > 0.8, "{method}");
+    }
+    for picture in ["image.png", "image.apng", "image.svg"] {
+        assert!(bench.path("all").join(picture).exists(), "{picture}");
+    }
+    // Fourier coefficients of two measurements: one with a frequency that was not read.
+    let steps: String = [1.0, 2.0]
+        .iter()
+        .map(|gain| {
+            let cells: Vec<String> = (0..64)
+                .map(|k| match (*gain, k) {
+                    (2.0, 9) => "nan".to_owned(),
+                    _ => format!("{}", gain * f64::from(k * 7 % 19)),
+                })
+                .collect();
+            cells.join(",") + "\n"
+        })
+        .collect();
+    bench.write("steps.csv", steps.as_bytes());
+    let line = ["reconstruct", "steps.csv", "--patterns", "fourier:4", "--size", "4x4"];
+    bench.run(&[&line[..], &["--index", "all", "--out", "f"]].concat()).succeeded();
+    let all = bench.pixels("f/image.npy");
+    for (k, image) in all.chunks_exact(16).enumerate() {
+        bench.run(&[&line[..], &["--index", &k.to_string(), "--out", "g"]].concat()).succeeded();
+        assert_eq!(image, bench.pixels("g/image.npy"), "frame {k}");
+    }
+    bench.write(
+        "gone.npy",
+        &npy::encode(&[2, 160], &[vec![1.0; 160], vec![f32::NAN; 160]].concat()),
+    );
+    bench
+        .run(&["reconstruct", "gone.npy", "--matrix", "phi.npy", "--index", "all"])
+        .failed(1, &["gone.npy", "is NaN everywhere in measurement 1"]);
+}
+
 /// The complement of a pattern lights what the pattern leaves dark.
 #[test]
 fn pattern_and_complement_give_differences() {

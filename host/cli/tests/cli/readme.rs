@@ -42,6 +42,11 @@ const NOT_RUN: &[(&str, &str, &str)] = &[
     ("docs/bring-up.md", "openFPGALoader", "needs the FPGA board"),
     ("docs/bring-up.md", "nirspi camera devices", "opens every serial port of this machine"),
     ("docs/browser.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),
+    (
+        "docs/feeds.md",
+        "inspect feed:127.0.0.1:",
+        "needs the readings of another program; tests/cli/inspect.rs",
+    ),
     ("docs/feeds.md", "python bench.py", "a bench sends for ever; tests/cli/feed.rs"),
     ("docs/feeds.md", "reconstruct rec.npz", "the recording of that bench; tests/cli/feed.rs"),
     ("docs/gallery.md", "host/web/build.sh", "builds WebAssembly; .ci/run web"),

@@ -6,6 +6,7 @@ use crate::trace::Raw;
 use nirspi_recon::law::Form;
 use nirspi_recon::{Order, Side, Size};
 use serde::Deserialize;
+use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
 
@@ -157,6 +158,15 @@ impl FromStr for Numbers {
                 .parse()
                 .map(Self::Binary)
                 .map_err(|_| format!("text, {}", Raw::ALL.map(Raw::name).join(", "))),
+        }
+    }
+}
+
+impl fmt::Display for Numbers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text => f.write_str("text"),
+            Self::Binary(raw) => f.write_str(raw.name()),
         }
     }
 }

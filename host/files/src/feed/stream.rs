@@ -237,6 +237,12 @@ impl Feed {
         self.frames.account()
     }
 
+    /// Number of readings of a frame that has begun and is not complete.
+    #[must_use]
+    pub fn begun(&self) -> usize {
+        self.frames.frame().len() % self.header.readings()
+    }
+
     /// Waits for the next frame, for this long at most.
     pub fn next(&mut self, patience: Duration) -> Next<'_> {
         match (self.frame_comes(patience), &self.end) {

@@ -8,7 +8,7 @@ mod s_matrix;
 #[cfg(test)]
 mod tests;
 
-pub(super) use fourier::{Coefficients, read_fourier};
+pub(super) use fourier::read_fourier;
 
 use super::patterns::Patterns;
 use nirspi_recon::Size;

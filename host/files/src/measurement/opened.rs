@@ -3,6 +3,7 @@
 use super::called::called;
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
+use super::remedy::all_on;
 use super::rows::{Shown, read_rows, read_side, repeats, shown, side_of_pixels};
 use super::sides::make_pairs;
 use super::{
@@ -10,7 +11,7 @@ use super::{
 };
 use crate::field::Field;
 use crate::fields::Fields;
-use nirspi_recon::law::{Claim, OVERLOAD};
+use nirspi_recon::law::{Claim, LampReadings, OVERLOAD};
 use nirspi_recon::{Image, Rows, Side};
 use std::path::Path;
 
@@ -100,7 +101,7 @@ impl Opened {
                 found
             }
         };
-        want.remedy.check(path, &readings.name, form)?;
+        want.remedy.check(path, &readings.name, form, &rows)?;
         if want.transpose {
             let n = side.pixels() as u32;
             for row in rows.iter_mut().flatten() {
@@ -180,6 +181,17 @@ impl Loaded<'_> {
         (rows, groups)
     }
 
+    /// The readings of the all-on pattern among these, if it was shown again and again without complements.
+    fn lamp_readings(&self, y: &[f64]) -> Option<LampReadings> {
+        let opened = self.opened;
+        // The list of all rows has each row once.
+        if opened.form.readings() == 2 || opened.every_row.is_some() {
+            return None;
+        }
+        let places = all_on(&opened.rows).into_iter().filter(|&at| is_reading(y[at]));
+        LampReadings::new(places.collect(), y)
+    }
+
     /// The measurement of this index, without the patterns that were not read.
     pub(super) fn measurement(&self, index: usize) -> Result<MeasurementFile, FileError> {
         let Self { opened, numbers } = self;
@@ -194,7 +206,14 @@ impl Loaded<'_> {
         let overloads = (0..real.len()).filter(overloaded).collect();
         let count = opened.rows.len();
         let applied = |values| opened.remedy.applied(opened.form, count, values);
-        let (real, imaginary) = (applied(real), imaginary.map(applied));
+        let (mut real, imaginary) = (applied(real), imaginary.map(applied));
+        let mut lamp = None;
+        if let (Some(steady), None) = (self.lamp_readings(&real), &imaginary) {
+            lamp = steady.lamp(&real, opened.form);
+            if opened.remedy.divide_by_lamp {
+                real = steady.divided(&real);
+            }
+        }
         let at = |k: usize| {
             let (first, second) = match opened.form {
                 Form::Pairs => (2 * k, Some(2 * k + 1)),
@@ -244,10 +263,11 @@ impl Loaded<'_> {
             places,
             not_read,
             overloads,
+            lamp,
             claim: Claim {
                 form: opened.form,
                 side_guessed: opened.side_guessed,
-                divide_by_sums: opened.remedy.divide_by_sums,
+                divide_by_lamp: opened.remedy.divide_by_lamp,
             },
             remedy: opened.remedy,
             patterns: count,

@@ -3,33 +3,16 @@
 use super::axes::joined;
 use super::called::called;
 use super::layout::Layout;
-use super::named::{Coefficients, NamedPatterns, read_fourier};
+use super::named::{NamedPatterns, read_fourier};
 use super::opened::{is_reading, read_simulated, stated_form};
 use super::patterns::{PatternArray, PatternSelection, Patterns};
 use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings_field};
 use super::sides::{make_pairs, two_fields};
+use super::weighed::{Plain, Which};
 use super::{FileError, Form, Selection};
 use crate::fields::Fields;
 use std::path::Path;
-
-/// Readings of patterns of a user's own.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Plain {
-    /// What the readings weigh the light with: all patterns, those that were not read included.
-    pub patterns: Patterns,
-    /// The readings, all finite.
-    pub values: Vec<f64>,
-    /// The pattern of each reading.
-    pub places: Vec<usize>,
-    /// Patterns that were not read: the file has NaN, or an instrument's word for overload.
-    pub not_read: Vec<usize>,
-    /// Whether the file says that no real light was measured; `None` if it does not say.
-    pub simulated: Option<bool>,
-    /// What people may not expect, one line each.
-    pub notes: Vec<String>,
-    /// Whether the values may hold a constant dark level.
-    pub dark: bool,
-}
+use std::sync::Arc;
 
 /// Reads patterns from `matrix`, a file, a folder of pictures, or [`NamedPatterns`], and one number for each pattern
 /// from the file `readings`: a reading, from `y` or else from `d`, or the difference of pattern and
@@ -43,17 +26,37 @@ pub fn read_plain(
     readings: &Path,
     want: &Selection,
 ) -> Result<Plain, FileError> {
+    Ok(read_which(matrix, of_patterns, readings, want, Which::One)?.remove(0))
+}
+
+/// As [`read_plain`], every measurement of the file: at least one.
+///
+/// # Errors
+/// As [`super::read`].
+pub fn read_plain_all(
+    matrix: &Path,
+    of_patterns: &PatternSelection,
+    readings: &Path,
+    want: &Selection,
+) -> Result<Vec<Plain>, FileError> {
+    read_which(matrix, of_patterns, readings, want, Which::All)
+}
+
+fn read_which(
+    matrix: &Path,
+    of_patterns: &PatternSelection,
+    readings: &Path,
+    want: &Selection,
+    which: Which,
+) -> Result<Vec<Plain>, FileError> {
     match NamedPatterns::instead_of(matrix) {
         Some(Ok(NamedPatterns::Fourier { steps })) => {
-            let Coefficients { patterns, values, not_read, simulated, notes } =
-                read_fourier(steps, of_patterns, readings, want)?;
-            let places = (0..values.len()).collect();
-            return Ok(Plain { patterns, values, places, not_read, simulated, notes, dark: false });
+            return read_fourier(steps, of_patterns, readings, want, which);
         }
         Some(Ok(set)) => {
             let refused = |(found, expected)| FileError::field(matrix, "--size", found, expected);
             let patterns = set.patterns(of_patterns.size).map_err(refused)?;
-            return Ok(read_numbers(readings, want, patterns.count)?.plain(patterns));
+            return Ok(read_numbers(readings, want, which, patterns.count)?.plain(patterns));
         }
         Some(Err(expected)) => {
             return Err(FileError::field(matrix, "--matrix", "is no file and no set", expected));
@@ -64,7 +67,7 @@ pub fn read_plain(
     let arrangements = array.arrangements(of_patterns.size)?;
     let mut refused = None;
     for arrangement in arrangements {
-        match read_numbers(readings, want, arrangement.count) {
+        match read_numbers(readings, want, which, arrangement.count) {
             Ok(mut numbers) => {
                 numbers.notes.extend(array.note(arrangement));
                 return Ok(numbers.plain(array.patterns(arrangement)));
@@ -77,27 +80,37 @@ pub fn read_plain(
 
 /// A number for each pattern, NaN where none was read.
 struct Numbers {
-    all: Vec<f64>,
+    /// Of each measurement: at least one.
+    all: Vec<Vec<f64>>,
     form: Form,
     simulated: Option<bool>,
     notes: Vec<String>,
 }
 
 impl Numbers {
-    fn plain(self, patterns: Patterns) -> Plain {
+    fn plain(self, patterns: Patterns) -> Vec<Plain> {
         let Self { all, form, simulated, notes } = self;
-        let (places, not_read): (Vec<usize>, Vec<usize>) =
-            (0..all.len()).partition(|&k| is_reading(all[k]));
-        let patterns = match form {
+        let patterns = Arc::new(match form {
             Form::Single => patterns,
             _ => patterns.differences(),
+        });
+        let plain = |all: Vec<f64>| {
+            let (places, not_read): (Vec<usize>, Vec<usize>) =
+                (0..all.len()).partition(|&k| is_reading(all[k]));
+            let values = places.iter().map(|&k| all[k]).collect();
+            let (patterns, notes) = (Arc::clone(&patterns), notes.clone());
+            Plain { patterns, values, places, not_read, simulated, notes, dark: true }
         };
-        let values = places.iter().map(|&k| all[k]).collect();
-        Plain { patterns, values, places, not_read, simulated, notes, dark: true }
+        all.into_iter().map(plain).collect()
     }
 }
 
-fn read_numbers(path: &Path, want: &Selection, patterns: usize) -> Result<Numbers, FileError> {
+fn read_numbers(
+    path: &Path,
+    want: &Selection,
+    which: Which,
+    patterns: usize,
+) -> Result<Numbers, FileError> {
     let mut fields = Fields::open(path, want.decimal_comma)?;
     let want = &*called(&mut fields, want)?;
     let name = readings_field(&fields, want)?;
@@ -125,25 +138,42 @@ fn read_numbers(path: &Path, want: &Selection, patterns: usize) -> Result<Number
     let mut readings = NamedReadings::open(&mut fields, name, want, &expected)?;
     let layout = readings.layout;
     let numbers = readings.numbers(&mut fields)?;
-    let refused = |found, expected| FileError::field(path, readings.name.clone(), found, expected);
+    let refused =
+        |found: &str, expected| FileError::field(path, readings.name.clone(), found, expected);
     if numbers.imaginary.is_some() {
         return Err(refused("has complex numbers", "real ones for patterns of one's own"));
     }
-    let index = layout.choose(path, &readings.name, want.index)?;
-    let all = layout.series(&numbers.real, index);
-    check_infinite(path, &readings.name, &all)?;
+    let indices = match which {
+        Which::One => {
+            let index = layout.choose(path, &readings.name, want.index)?;
+            index..index + 1
+        }
+        Which::All => 0..layout.count,
+    };
     let difference =
         |pattern: f64, complement: f64| match is_reading(pattern) && is_reading(complement) {
             true => pattern - complement,
             false => f64::NAN,
         };
-    let all: Vec<f64> = match form {
-        Form::Single | Form::Differences => all,
-        Form::Pairs => all.as_chunks().0.iter().map(|&[on, off]| difference(on, off)).collect(),
-        Form::Halves => (0..patterns).map(|k| difference(all[k], all[patterns + k])).collect(),
-    };
-    if !all.iter().copied().any(is_reading) {
-        return Err(refused("is NaN everywhere", "a pattern that was read"));
+    let mut all = Vec::with_capacity(indices.len());
+    for index in indices {
+        let values = layout.series(&numbers.real, index);
+        check_infinite(path, &readings.name, &values)?;
+        let values: Vec<f64> = match form {
+            Form::Single | Form::Differences => values,
+            Form::Pairs => {
+                values.as_chunks().0.iter().map(|&[on, off]| difference(on, off)).collect()
+            }
+            Form::Halves => {
+                (0..patterns).map(|k| difference(values[k], values[patterns + k])).collect()
+            }
+        };
+        if !values.iter().copied().any(is_reading) {
+            let place =
+                if layout.count > 1 { format!(" in measurement {index}") } else { String::new() };
+            return Err(refused(&format!("is NaN everywhere{place}"), "a pattern that was read"));
+        }
+        all.push(values);
     }
     if form.readings() == 2 {
         notes.push("the image is that of pattern minus complement".to_owned());

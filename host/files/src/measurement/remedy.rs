@@ -1,6 +1,8 @@
 //! What must be done with the readings of a file before they are those of its form.
 
 use super::{FileError, Form};
+use nirspi_recon::law::LampReadings;
+use nirspi_recon::words::count_of;
 use std::path::Path;
 
 /// What must be done with the readings of a file, because the user says so. The default is nothing.
@@ -15,8 +17,8 @@ pub struct Remedy {
     pub shift: i32,
     /// Number of sweeps in the file, one after another; 0 is one sweep.
     pub sweeps: u32,
-    /// Each difference is divided by the sum of its pair.
-    pub divide_by_sums: bool,
+    /// Readings are divided by the lamp's level: the sum of their pair, or the all-on readings among them.
+    pub divide_by_lamp: bool,
 }
 
 impl Remedy {
@@ -26,17 +28,33 @@ impl Remedy {
         self.sweeps.max(1) as usize
     }
 
-    /// Refuses what the form of the readings leaves no room for.
-    pub(super) fn check(self, path: &Path, field: &str, form: Form) -> Result<(), FileError> {
-        let option = match self {
-            _ if form.readings() == 2 => return Ok(()),
-            Self { complements_first: true, .. } => "--complements-first",
-            Self { divide_by_sums: true, .. } => "--divide-by-sums",
-            _ => return Ok(()),
-        };
+    /// Refuses what the form of the readings leaves no room for. `rows` are those shown.
+    pub(super) fn check(
+        self,
+        path: &Path,
+        field: &str,
+        form: Form,
+        rows: &[Option<u32>],
+    ) -> Result<(), FileError> {
+        if form.readings() == 2 {
+            return Ok(());
+        }
         let found = format!("holds no complements ({})", form.name());
-        let expected = format!("--readings pairs or halves with {option}");
-        Err(FileError::field(path, field, found, expected))
+        let refused = |found: String, expected: &str| {
+            let expected = format!("--readings pairs or halves{expected}");
+            Err(FileError::field(path, field, found, expected))
+        };
+        match self {
+            Self { complements_first: true, .. } => refused(found, " with --complements-first"),
+            Self { divide_by_lamp: true, .. }
+                if !LampReadings::are_enough(&all_on(rows), rows.len()) =>
+            {
+                let shown = count_of(all_on(rows).len(), "all-on reading");
+                let expected = ", or the all-on pattern at least 4 times over the sweep, with --divide-by-lamp";
+                refused(format!("{found} and {shown}"), expected)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The place among the readings of the file of the reading at `at`; `None` for a reading that is missing.
@@ -58,6 +76,11 @@ impl Remedy {
         let of = |at| self.place(form, patterns, at).and_then(|place| readings.get(place));
         (0..readings.len()).map(|at| of(at).map_or(f64::NAN, |reading| sign * reading)).collect()
     }
+}
+
+/// The places of the all-on pattern among the rows shown.
+pub(super) fn all_on(rows: &[Option<u32>]) -> Vec<usize> {
+    (0..rows.len()).filter(|&at| rows[at] == Some(0)).collect()
 }
 
 #[cfg(test)]

@@ -5,21 +5,22 @@
 //! No number of a table is lost in silence: what is left out is no line of numbers like those of the
 //! table, and is told (`tests::a_table_with_a_gap_is_refused_as_before`).
 
-use super::{Separators, parse, shortened};
+use super::{BLOCK, Line, Lines, Separators, Words, parse, shortened};
 use crate::FileError;
 use crate::field::Field;
 use nirspi_recon::words::count_of;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// The fewest lines of such a table. Fewer may be anything.
-const LEAST_LINES: usize = 8;
+pub(super) const LEAST_LINES: usize = 8;
 
 /// The most lines before the table, and after it.
-const MOST_BEFORE: usize = 64;
-const MOST_AFTER: usize = 3;
+pub(super) const MOST_BEFORE: usize = 64;
+pub(super) const MOST_AFTER: usize = 3;
 
 /// Words for units below a heading, in brackets or without.
-const UNITS: [&str; 20] = [
+pub(super) const UNITS: [&str; 20] = [
     "s", "ms", "us", "ns", "sec", "second", "seconds", "v", "mv", "uv", "volt", "volts", "a", "ma",
     "w", "mw", "hz", "db", "sequence", "counts",
 ];
@@ -32,64 +33,68 @@ pub(super) struct Found {
     pub skipped: Option<String>,
 }
 
-/// A line and its number.
-type Line<'t> = (usize, &'t str);
-
 /// The table in these lines; `None` if no table is found, or if it is not certain that the lines are one
 /// table.
 pub(super) fn find(
     path: &Path,
-    lines: &[Line<'_>],
+    all: &Lines<'_>,
     decimal_comma: bool,
 ) -> Option<Result<Found, FileError>> {
-    let body = longest(lines)?;
+    let lines = &all.lines;
+    let body = longest(all)?;
     let (before, after) = (&lines[..body.start], &lines[body.end..]);
     if before.len() > MOST_BEFORE || after.len() > MOST_AFTER {
         return None;
     }
     let body = &lines[body];
     let above = before.last().map(|(_, line)| *line);
-    let separators = match Separators::of(path, above, body, decimal_comma) {
+    let separators = match Separators::of(path, above, all, body, decimal_comma) {
         Ok(separators) => separators,
         Err(error) => return Some(Err(error)),
     };
-    let rows: Vec<Vec<&str>> =
-        body.iter().map(|(_, line)| cells(line, separators.between)).collect();
-    let width = rows[0].len();
-    if rows.iter().any(|row| row.len() != width) {
-        return None;
-    }
+    let between = separators.between;
+    let width = cells(body[0].1, between).count();
     let number = |word: &str| parse(word, separators.decimal);
-    let numeric: Vec<usize> = (0..width).filter(|&at| is_numeric(&rows, at, number)).collect();
-    let is_row =
-        |row: &[&str]| row.len() == width && numeric.iter().all(|&at| number(row[at]).is_some());
-    let outside = before.iter().chain(after).map(|(_, line)| cells(line, separators.between));
-    if numeric.is_empty() || outside.into_iter().any(|row| is_row(&row)) {
+    let blocks: Option<Vec<Block>> =
+        body.par_chunks(BLOCK).map(|lines| Block::of(lines, between, width, number)).collect();
+    let blocks = blocks?;
+    let count = |of: fn(&Block) -> &[usize], at: usize| -> usize {
+        blocks.iter().map(|block| of(block)[at]).sum()
+    };
+    // At least half of the column's cells are numbers.
+    let is_numeric = |&at: &usize| 2 * count(|block| &block.numbers, at) >= body.len();
+    let numeric: Vec<usize> = (0..width).filter(is_numeric).collect();
+    let is_row = |line: &str| {
+        let row: Vec<&str> = cells(line, between).collect();
+        row.len() == width && numeric.iter().all(|&at| number(row[at]).is_some())
+    };
+    if numeric.is_empty() || before.iter().chain(after).any(|(_, line)| is_row(line)) {
         return None;
     }
     // A last line of totals.
-    let rows_end = rows.iter().rposition(|row| is_row(row)).map_or(0, |last| last + 1);
-    let ends = rows.len() - rows_end;
+    let rows_end = body.iter().rposition(|(_, line)| is_row(line)).map_or(0, |last| last + 1);
+    let ends = body.len() - rows_end;
     if ends > MOST_AFTER || rows_end < LEAST_LINES {
         return None;
     }
-    let wrong = |line: usize, word: &str| {
+    let cell = |row: usize, at: usize| blocks[row / BLOCK].cells[row % BLOCK * width + at];
+    let is_missing = |row: usize| numeric.iter().copied().find(|&at| cell(row, at).is_none());
+    if let Some((row, at)) = (0..rows_end).find_map(|row| Some((row, is_missing(row)?))) {
+        let (line, content) = body[row];
+        let word = cells(content, between).nth(at).unwrap_or_default();
         let found = format!("has {:?} in line {line}", shortened(word));
-        FileError::field(path, "table", found, "a number")
-    };
-    let mut columns = vec![Vec::with_capacity(rows_end); numeric.len()];
-    for ((line, _), row) in body.iter().zip(&rows[..rows_end]) {
-        for (column, &at) in columns.iter_mut().zip(&numeric) {
-            match number(row[at]) {
-                Some(value) => column.push(value),
-                None => return Some(Err(wrong(*line, row[at]))),
-            }
-        }
+        return Some(Err(FileError::field(path, "table", found, "a number")));
     }
-    let (heading, units) = heading(before, separators.between, &numeric, number);
+    let column = |&at: &usize| {
+        let cells = blocks.iter().flat_map(|block| block.cells.iter().skip(at).step_by(width));
+        let real: Vec<f64> = cells.take(rows_end).map(|cell| cell.unwrap_or(f64::NAN)).collect();
+        Field { shape: vec![real.len()], real, imaginary: None }
+    };
+    let columns: Vec<Field> = numeric.par_iter().map(column).collect();
+    let (heading, units) = heading(before, between, &numeric, number);
     let named = |heading: &Vec<&str>, at: usize| heading[at].trim_matches('"').trim().to_owned();
     let words: Vec<String> = (0..width)
-        .filter(|at| !numeric.contains(at) && rows.iter().any(|row| !row[*at].is_empty()))
+        .filter(|at| !numeric.contains(at) && count(|block| &block.filled, *at) > 0)
         .map(|at| match heading.as_ref().filter(|heading| at < heading.len()) {
             Some(heading) => format!("`{}`", shortened(&named(heading, at))),
             None => format!("{}", at + 1),
@@ -111,25 +116,75 @@ pub(super) fn find(
         skipped.push(format!("{} after it", count_of(after.len() + ends, "line")));
     }
     let names = heading.map(|heading| numeric.iter().map(|&at| named(&heading, at)).collect());
-    let field = |real: Vec<f64>| Field { shape: vec![real.len()], real, imaginary: None };
-    let columns = columns.into_iter().map(field).collect();
     let told = || format!("left out of the text: {}", skipped.join("; "));
     let skipped = (!skipped.is_empty()).then(told);
     Some(Ok(Found { columns, names, skipped }))
 }
 
+/// The cells of some lines.
+struct Block {
+    /// The number in each cell, one line after another; `None` for a word.
+    cells: Vec<Option<f64>>,
+    /// How many cells of each column are numbers, and how many are not empty.
+    numbers: Vec<usize>,
+    filled: Vec<usize>,
+}
+
+impl Block {
+    /// `None` if a line has another number of cells.
+    fn of(
+        lines: &[Line<'_>],
+        between: Option<char>,
+        width: usize,
+        number: impl Fn(&str) -> Option<f64>,
+    ) -> Option<Self> {
+        let (mut numbers, mut filled) = (vec![0; width], vec![0; width]);
+        let mut all = Vec::with_capacity(lines.len() * width);
+        for (_, line) in lines {
+            let before = all.len();
+            for (at, word) in cells(line, between).enumerate() {
+                let (numbers, filled) = (numbers.get_mut(at)?, &mut filled[at]);
+                let found = number(word);
+                if !word.is_empty() {
+                    *filled += 1;
+                    *numbers += usize::from(found.is_some());
+                }
+                all.push(found);
+            }
+            if all.len() - before != width {
+                return None;
+            }
+        }
+        Some(Self { cells: all, numbers, filled })
+    }
+}
+
 /// The longest run of lines with the same number of cells, some of them numbers.
-fn longest(lines: &[Line<'_>]) -> Option<std::ops::Range<usize>> {
+fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
     let mut best = 0..0;
+    let mut has_whole = false;
     for between in [Some(';'), Some('\t'), Some(','), None] {
+        if let Some(mark) = between
+            && !all.text.contains(mark)
+        {
+            // Lines without the mark are one cell each, whatever the mark is.
+            if std::mem::replace(&mut has_whole, true) {
+                continue;
+            }
+        }
         let shape = |(_, line): &Line<'_>| {
-            let cells = cells(line, between);
-            let is_number = |word: &&str| {
-                !word.is_empty() && (parse(word, '.').is_some() || parse(word, ',').is_some())
+            // A number with a comma is one with a decimal comma.
+            let is_number = |word: &str| {
+                let decimal = if word.contains(',') { ',' } else { '.' };
+                !word.is_empty() && parse(word, decimal).is_some()
             };
-            (cells.len(), cells.iter().any(is_number))
+            let mut cells = cells(line, between);
+            let mut count = 0;
+            let has_number = cells.by_ref().inspect(|_| count += 1).any(is_number);
+            (count + cells.count(), has_number)
         };
-        let shapes: Vec<(usize, bool)> = lines.iter().map(shape).collect();
+        let shapes: Vec<(usize, bool)> =
+            all.lines.par_iter().with_min_len(BLOCK).map(shape).collect();
         let mut start = 0;
         for run in shapes.chunk_by(|a, b| a == b) {
             if run[0].1 && run.len() > best.len() {
@@ -139,12 +194,6 @@ fn longest(lines: &[Line<'_>]) -> Option<std::ops::Range<usize>> {
         }
     }
     (best.len() >= LEAST_LINES).then_some(best)
-}
-
-/// Whether at least half of a column's cells are numbers.
-fn is_numeric(rows: &[Vec<&str>], at: usize, number: impl Fn(&str) -> Option<f64>) -> bool {
-    let numbers = rows.iter().filter(|row| !row[at].is_empty() && number(row[at]).is_some());
-    2 * numbers.count() >= rows.len()
 }
 
 /// The names of the columns, in the line before the table or in that before a line of units; and whether
@@ -157,7 +206,7 @@ fn heading<'t>(
 ) -> (Option<Vec<&'t str>>, bool) {
     let last = numeric.last().copied().unwrap_or(0);
     let words = |(_, line): &Line<'t>| {
-        let cells = cells(line, between);
+        let cells: Vec<&str> = cells(line, between).collect();
         let are_words = cells.len() > last
             && numeric.iter().all(|&at| cells[at].is_empty() || number(cells[at]).is_none())
             && numeric.iter().any(|&at| !cells[at].is_empty());
@@ -177,13 +226,8 @@ fn heading<'t>(
 }
 
 /// The cells of a line. A separator in quotes separates nothing.
-fn cells(line: &str, between: Option<char>) -> Vec<&str> {
-    let mut quoted = false;
-    let parts = line.split(|c: char| {
-        quoted ^= c == '"';
-        !quoted && between.map_or(c.is_whitespace(), |mark| c == mark)
-    });
-    parts.map(str::trim).filter(|word| between.is_some() || !word.is_empty()).collect()
+fn cells(line: &str, between: Option<char>) -> Words<'_> {
+    Words::of(line, between, true)
 }
 
 #[cfg(test)]

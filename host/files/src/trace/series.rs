@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 /// The kind of file that a path should lead to, for error messages.
 const EXPECTED: &str =
-    "a trace: .npz, .npy, .mat, .h5, .csv or .txt, or numbers without a heading (--raw)";
+    "a trace: .npz, .npy, .mat, .h5, .csv, .txt or .wav, or numbers without a heading (--raw)";
 
 /// An open file of samples.
 pub(super) struct Series {

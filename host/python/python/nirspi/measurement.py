@@ -416,7 +416,7 @@ def source_options(
     inverted: bool = False,
     shift: int = 0,
     sweeps: int | None = None,
-    divide_by_sums: bool = False,
+    divide_by_lamp: bool = False,
     part: str = "magnitude",
     keep_leak: bool = False,
     no_flat_field: bool = False,
@@ -435,7 +435,7 @@ def source_options(
         "inverted": bool(inverted),
         "shift": int(shift),
         "sweeps": _arrays.count(sweeps, "sweeps", least=1),
-        "divide_by_sums": bool(divide_by_sums),
+        "divide_by_lamp": bool(divide_by_lamp),
         "part": part,
         "keep_leak": bool(keep_leak),
         "no_flat_field": bool(no_flat_field),
@@ -457,7 +457,7 @@ def load(
     inverted: bool = False,
     shift: int = 0,
     sweeps: int | None = None,
-    divide_by_sums: bool = False,
+    divide_by_lamp: bool = False,
     part: str = "magnitude",
     keep_leak: bool = False,
     no_flat_field: bool = False,
@@ -496,9 +496,10 @@ def load(
         Number of first readings of the sweep that the file lacks; -K: K readings came before the sweep.
     sweeps : int, optional
         Number of sweeps of the same patterns in the file, one after another.
-    divide_by_sums : bool
-        Whether each difference is divided by the sum of its pair, against a lamp that drifts or flickers.
-        Ambient light makes this correction too weak.
+    divide_by_lamp : bool
+        Whether readings are divided by the lamp's level, against a lamp that drifts or flickers: of pairs
+        by their sums, of readings without complements by those of the all-on pattern, if it was shown at
+        least four times over the sweep. Ambient light makes this correction too weak.
     part : {"magnitude", "real", "imaginary"}
         Of complex readings: "magnitude" keeps both parts (``d`` is complex).
     keep_leak : bool
@@ -539,7 +540,7 @@ def load(
         inverted=inverted,
         shift=shift,
         sweeps=sweeps,
-        divide_by_sums=divide_by_sums,
+        divide_by_lamp=divide_by_lamp,
         part=part,
         keep_leak=keep_leak,
         no_flat_field=no_flat_field,

@@ -135,7 +135,7 @@ pub(super) fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Meas
     outliers.sort_by_key(|outlier| outlier.reading);
     let kept: Vec<usize> = (0..pairs.len()).filter(|&k| !lost[k]).collect();
     let lamp = Lamp::of(&upright, &level, &kept, first).filter(|_| clipped.is_none());
-    let steady = match claim.divide_by_sums {
+    let steady = match claim.divide_by_lamp {
         true => divided(pairs, &kept),
         false => pairs.to_vec(),
     };

@@ -171,8 +171,8 @@ fn under_a_lamp(lamp: fn(f64) -> f64, ambient: f64, sigma: f64) -> (Lamp, f64, f
     let y: Vec<f64> = (0..noisy.len())
         .map(|k| steady[k] * lamp((k / 2) as f64) + ambient + noisy[k] - steady[k])
         .collect();
-    let of = |divide_by_sums| {
-        let read = read(&rows, &y, Claim { divide_by_sums, ..Form::Pairs.into() }).unwrap();
+    let of = |divide_by_lamp| {
+        let read = read(&rows, &y, Claim { divide_by_lamp, ..Form::Pairs.into() }).unwrap();
         // The unit of divided differences is the lamp's median.
         let truth = Measurements::from_pairs(&rows, &steady).unwrap().measurements;
         let (found, truth) = (&read.measurements.values()[1..], &truth.values()[1..]);

@@ -40,7 +40,9 @@ mod complete;
 mod error;
 mod folds;
 mod gram;
+mod many;
 mod problem;
+mod pseudo_inverse;
 mod solvers;
 
 use super::Penalty;
@@ -48,9 +50,7 @@ use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
 use crate::{Image, Shape, Size};
 pub use error::MatrixError;
-use folds::Folds;
 use nalgebra::{DMatrix, DVector};
-use problem::{Fit, Problem};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -193,6 +193,9 @@ const TRIED: usize = 1 << 20;
 /// Numbers of atoms to try, up to the number of measurements.
 const SPARSITIES: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 200, 300];
 
+/// The most measurements at a time: images on trial are in memory for all of them.
+const BATCH: usize = 128;
+
 /// Smallest pivot of the Gram matrix, relative to the largest, for which a pattern counts as
 /// linearly independent.
 const NEW: f64 = 1e-11;
@@ -267,127 +270,29 @@ impl OwnMatrix {
         y: &[f64],
         settings: &MatrixSettings,
     ) -> Result<MatrixReconstruction, MatrixError> {
-        if y.len() != self.patterns() {
-            return Err(MatrixError::Length { found: y.len(), expected: self.patterns() });
+        Ok(self.reconstruct_all(&[y], settings)?.remove(0))
+    }
+
+    /// The images of any number of measurements, each with one number for each pattern. Each image is
+    /// that of [`reconstruct`](Self::reconstruct) (`tests::many::images_are_those_of_each_alone`), and
+    /// what depends on the patterns alone is found out once.
+    ///
+    /// # Errors
+    /// As [`reconstruct`](Self::reconstruct).
+    pub fn reconstruct_all(
+        &self,
+        all: &[&[f64]],
+        settings: &MatrixSettings,
+    ) -> Result<Vec<MatrixReconstruction>, MatrixError> {
+        for y in all {
+            if y.len() != self.patterns() {
+                return Err(MatrixError::Length { found: y.len(), expected: self.patterns() });
+            }
+            finite("y", y, 1)?;
         }
-        finite("y", y, 1)?;
         self.check(settings)?;
-        let settings = &self.decided(y, settings)?;
-        let every: Vec<usize> = (0..y.len()).collect();
-        let complete = complete::solve(self, y, settings);
-        let (fit, strength, atoms) = match settings.method {
-            _ if let Some((fit, strength)) = complete => (fit, Some(strength), None),
-            MatrixMethod::PseudoInverse => {
-                (self.pseudo_inverse(&DVector::from_column_slice(y), settings.dark), None, None)
-            }
-            MatrixMethod::Omp => {
-                let noise = match settings.strength {
-                    Some(strength) => strength,
-                    // A few atoms leave a residual above the noise, so the strongest of the equally
-                    // good strengths is used.
-                    None => {
-                        let errors = self.errors_of_strengths(y, settings, Penalty::Tikhonov)?;
-                        let as_good = as_good_as_the_best(&errors);
-                        STRENGTHS[errors.iter().position(as_good).unwrap_or(0)]
-                    }
-                };
-                let sparsity = match settings.sparsity {
-                    Some(sparsity) => sparsity,
-                    None => self.best_sparsity(y, settings, noise)?,
-                };
-                let problem = Problem::new(self, settings, y, &every)?;
-                let mut found = problem.omp(noise, &[sparsity], settings.non_negative)?;
-                let (fit, size, stop) = found.remove(0);
-                (fit, Some(noise), Some((size, stop)))
-            }
-            MatrixMethod::Best | MatrixMethod::Penalty(Penalty::Tikhonov)
-                if let Some(folds) = Folds::new(self, y, settings) =>
-            {
-                let (fit, strength) = folds.chosen();
-                (fit, Some(strength), None)
-            }
-            MatrixMethod::Best | MatrixMethod::Penalty(_) => {
-                let penalty = match settings.method {
-                    MatrixMethod::Penalty(penalty) => penalty,
-                    _ => Penalty::Tikhonov,
-                };
-                // The list of strengths is the same as in the comparison, because iterative methods
-                // keep a part of their start.
-                let strengths = match settings.strength {
-                    Some(strength) => vec![strength],
-                    None => {
-                        let errors = self.errors_of_strengths(y, settings, penalty)?;
-                        STRENGTHS[..=last_as_good(&errors)].to_vec()
-                    }
-                };
-                let problem = Problem::new(self, settings, y, &every)?;
-                let fit = problem.penalised(penalty, &strengths).swap_remove(strengths.len() - 1);
-                (fit, strengths.last().copied(), None)
-            }
-        };
-        let Fit { pixels, dark } = fit;
-        let y = DVector::from_column_slice(y).add_scalar(-dark.value());
-        let left = (&y - &self.patterns * &pixels).norm();
-        let residual = if y.norm() > 0.0 { left / y.norm() } else { 0.0 };
-        let image = Image::new(self.size, pixels.iter().map(|&v| v as f32).collect());
-        let method = settings.method;
-        Ok(MatrixReconstruction { image, method, strength, atoms, dark, residual })
-    }
-
-    /// The same settings, with [`MatrixMethod::Best`] replaced by the method that it chooses for these
-    /// measurements.
-    fn decided(&self, y: &[f64], settings: &MatrixSettings) -> Result<MatrixSettings, MatrixError> {
-        if settings.method != MatrixMethod::Best {
-            return Ok(settings.clone());
-        }
-        let with =
-            |penalty| MatrixSettings { method: MatrixMethod::Penalty(penalty), ..settings.clone() };
-        let tikhonov = with(Penalty::Tikhonov);
-        let is_known = settings.strength.is_some() || settings.atoms.is_some();
-        if is_known || self.patterns.len() > TRIED || complete::is_complete(self) {
-            return Ok(tikhonov);
-        }
-        let total_variation = with(Penalty::TotalVariation);
-        let least = |settings: &MatrixSettings, penalty| -> Result<f64, MatrixError> {
-            let errors = self.errors_of_strengths(y, settings, penalty)?;
-            Ok(errors.into_iter().fold(f64::INFINITY, f64::min))
-        };
-        let is_better = least(&total_variation, Penalty::TotalVariation)?
-            < least(&tikhonov, Penalty::Tikhonov)?;
-        Ok(if is_better { total_variation } else { tikhonov })
-    }
-
-    /// The image of least norm, and the dark level.
-    fn pseudo_inverse(&self, y: &DVector<f64>, fits_dark: bool) -> Fit {
-        let invert = |y: &DVector<f64>| match &self.orthogonal {
-            Some(energies) => self.patterns.tr_mul(&y.component_div(energies)),
-            None => solvers::least_squares(&self.patterns, y),
-        };
-        let pixels = invert(y);
-        if !fits_dark {
-            return Fit { pixels, dark: DarkLevel::LeftOut };
-        }
-        let sums = self.patterns.column_sum();
-        let weight = sums.mean();
-        if weight != 0.0 && sums.iter().all(|sum| (sum - weight).abs() <= SAME_SUM * weight.abs()) {
-            // An even image explains what all measurements have in common.
-            let level = y.mean();
-            let pixels = invert(&y.add_scalar(-level)).add_scalar(level / weight);
-            return Fit { pixels, dark: DarkLevel::Unknown };
-        }
-        // The image that a dark level of 1 looks like, and what no image explains of it.
-        let ones = DVector::from_element(y.len(), 1.0);
-        let ghost = invert(&ones);
-        let unexplained = &ones - &self.patterns * &ghost;
-        let dark = if unexplained.norm_squared() > UNEXPLAINED * y.len() as f64 {
-            DarkLevel::Fitted(unexplained.dot(y) / unexplained.norm_squared())
-        } else {
-            match solvers::smoothest(self.size, &pixels, &ghost) {
-                Some(level) => DarkLevel::Smoothest(level),
-                None => DarkLevel::Unknown,
-            }
-        };
-        Fit { pixels: pixels - ghost * dark.value(), dark }
+        let batches = all.chunks(BATCH).map(|all| many::Many::new(self, settings, all).images());
+        Ok(batches.collect::<Result<Vec<_>, _>>()?.concat())
     }
 
     fn check(&self, settings: &MatrixSettings) -> Result<(), MatrixError> {
@@ -417,56 +322,6 @@ impl OwnMatrix {
     fn transform(&self, basis: Basis) -> Result<Transform<Size>, MatrixError> {
         let size = self.size;
         Transform::of_size(basis, size).ok_or(MatrixError::Basis { basis, size })
-    }
-
-    fn errors_of_strengths(
-        &self,
-        y: &[f64],
-        settings: &MatrixSettings,
-        penalty: Penalty,
-    ) -> Result<Vec<f64>, MatrixError> {
-        let predict = |problem: &Problem| Ok(problem.penalised(penalty, &STRENGTHS));
-        if penalty == Penalty::Tikhonov
-            && let Some(folds) = Folds::new(self, y, settings)
-        {
-            return Ok(folds.errors());
-        }
-        self.errors(y, settings, STRENGTHS.len(), predict)
-    }
-
-    fn best_sparsity(
-        &self,
-        y: &[f64],
-        settings: &MatrixSettings,
-        noise: f64,
-    ) -> Result<usize, MatrixError> {
-        let sparsities: Vec<usize> = SPARSITIES.into_iter().filter(|&k| k <= y.len()).collect();
-        let predict = |problem: &Problem| {
-            let found = problem.omp(noise, &sparsities, settings.non_negative)?;
-            Ok(found.into_iter().map(|(fit, ..)| fit).collect())
-        };
-        Ok(sparsities[last_as_good(&self.errors(y, settings, sparsities.len(), predict)?)])
-    }
-
-    /// Errors of each of `count` images, made from the other measurements, on the held-back
-    /// measurements: sums of squares.
-    fn errors(
-        &self,
-        y: &[f64],
-        settings: &MatrixSettings,
-        count: usize,
-        predict: impl Fn(&Problem) -> Result<Vec<Fit>, MatrixError>,
-    ) -> Result<Vec<f64>, MatrixError> {
-        let mut errors = vec![0.0; count];
-        for (kept, held) in folds(y.len()) {
-            let images = predict(&Problem::new(self, settings, y, &kept)?)?;
-            for (error, Fit { pixels, dark }) in errors.iter_mut().zip(images) {
-                let seen = |k: usize| self.patterns.row(k).transpose().dot(&pixels) + dark.value();
-                let miss = |&k: &usize| (y[k] - seen(k)).powi(2);
-                *error += held.iter().map(miss).sum::<f64>();
-            }
-        }
-        Ok(errors)
     }
 }
 

@@ -83,7 +83,7 @@ impl FeedReport {
         let open = match &files[..] {
             [] => return words,
             [file, ..] if n.is_none() => {
-                format!("{file} --index 0 --matrix PATTERNS --size {height}x{width}")
+                format!("{file} --index all --matrix PATTERNS --size {height}x{width}")
             }
             [file] => format!("{file} --index all"),
             files => files.join(" "),

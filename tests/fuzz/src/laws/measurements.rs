@@ -3,7 +3,7 @@
 use crate::{Law, MIB, place, read};
 use nirspi::files::measurement::{
     self, MeasurementFile, PatternSelection, Plain, Readings, Selection, Several, read_images_of,
-    read_plain,
+    read_plain, read_plain_all,
 };
 use nirspi::files::output::Existing;
 use nirspi::files::table::Table;
@@ -18,7 +18,7 @@ use zip::{CompressionMethod, ZipWriter};
 pub const LAWS: &[Law] = &[
     Law {
         name: "measurements",
-        reads: "a measurement file as it comes: `.npz`, `.npy`, `.mat`, HDF5, text",
+        reads: "a measurement file as it comes: `.npz`, `.npy`, `.mat`, HDF5, text, `.wav`",
         readers: &[
             "host/files/src/fields.rs",
             "host/files/src/archive.rs",
@@ -27,6 +27,7 @@ pub const LAWS: &[Law] = &[
             "host/files/src/hdf5.rs",
             "host/files/src/text.rs",
             "host/files/src/text/export.rs",
+            "host/files/src/wav.rs",
         ],
         holds: files,
         seeds: file_seeds,
@@ -159,6 +160,9 @@ fn own_patterns(path: &Path) {
         assert_eq!(places.len() + not_read.len(), patterns.count);
         assert!(values.iter().chain(&patterns.weights).all(|number| number.is_finite()));
         assert_eq!(patterns.select(&places).len(), 4 * places.len());
+        // The file holds this measurement alone, or it is refused without an index.
+        let all = read(read_plain_all(matrix, &of_patterns, input, &want)).expect("all of one");
+        assert_eq!((all.len(), &all[0].values, &all[0].places), (1, &values, &places));
     }
 }
 

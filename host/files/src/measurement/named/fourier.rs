@@ -13,12 +13,14 @@ use crate::measurement::called::called;
 use crate::measurement::opened::{is_reading, read_simulated};
 use crate::measurement::patterns::Patterns;
 use crate::measurement::readings::readings_field;
+use crate::measurement::weighed::{Plain, Which};
 use crate::measurement::{PatternSelection, Selection};
 use crate::plain::MAX_MEMORY_BYTES;
 use nirspi_recon::Size;
 use nirspi_recon::words::count_of;
 use std::f64::consts::{SQRT_2, TAU};
 use std::path::Path;
+use std::sync::Arc;
 
 /// A complex number.
 type Complex = (f64, f64);
@@ -58,21 +60,8 @@ struct Spectrum {
     values: Vec<Option<Complex>>,
 }
 
-/// Coefficients of frequencies as readings of cosines and sines, without a dark level.
-pub(in crate::measurement) struct Coefficients {
-    /// The cosines and sines.
-    pub(in crate::measurement) patterns: Patterns,
-    /// A value for each.
-    pub(in crate::measurement) values: Vec<f64>,
-    /// Frequencies that were not read.
-    pub(in crate::measurement) not_read: Vec<usize>,
-    /// Whether the file says that no real light was measured; `None` if it does not say.
-    pub(in crate::measurement) simulated: Option<bool>,
-    /// What people may not expect, one line each.
-    pub(in crate::measurement) notes: Vec<String>,
-}
-
-/// Reads the readings of Fourier patterns, or a complex spectrum, from a file.
+/// Reads the readings of Fourier patterns, or a complex spectrum, from a file: coefficients of frequencies
+/// as readings of cosines and sines, without a dark level.
 ///
 /// # Errors
 /// As [`read`](crate::measurement::read).
@@ -81,11 +70,12 @@ pub(in crate::measurement) fn read_fourier(
     of_patterns: &PatternSelection,
     readings: &Path,
     want: &Selection,
-) -> Result<Coefficients, FileError> {
+    which: Which,
+) -> Result<Vec<Plain>, FileError> {
     let mut fields = Fields::open(readings, want.decimal_comma)?;
     let want = &*called(&mut fields, want)?;
     let name = readings_field(&fields, want)?;
-    let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
+    let notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
     let simulated = read_simulated(&mut fields);
     let refused =
         |found: String, expected: String| FileError::field(readings, name.clone(), found, expected);
@@ -93,35 +83,68 @@ pub(in crate::measurement) fn read_fourier(
         true => fields.into_field(&name)?,
         false => fields.read(&name, |_| Ok(()))?,
     };
-    let field = one_of(field, want.index).map_err(|(found, expected)| refused(found, expected))?;
     let is_spectrum = field.imaginary.is_some();
-    let mut spectrum = match is_spectrum {
+    let spectrum = |field: Field| match is_spectrum {
         true => of_complex(field, of_patterns.size),
         false => of_steps(&field, steps, of_patterns.size),
+    };
+    let fields = match which {
+        Which::One => vec![one_of(field, want.index).map_err(|(f, e)| refused(f, e))?],
+        Which::All if spectrum(field.clone()).is_ok() => vec![field],
+        Which::All => each_of(field),
+    };
+    let mut found: Vec<Plain> = Vec::with_capacity(fields.len());
+    for field in fields {
+        let mut spectrum = spectrum(field).map_err(|(found, expected)| refused(found, expected))?;
+        let mut notes = notes.clone();
+        notes.extend(spectrum.center());
+        let not_read: Vec<usize> =
+            (0..spectrum.values.len()).filter(|&at| spectrum.values[at].is_none()).collect();
+        let (size, area) = (spectrum.size, spectrum.size.area());
+        let (rows, values) = spectrum.rows();
+        if values.is_empty() {
+            return Err(refused(
+                "has no frequency that was read".to_owned(),
+                "at least one".to_owned(),
+            ));
+        }
+        if (rows.len() * area * size_of::<f64>()) as u64 > MAX_MEMORY_BYTES {
+            let found = format!("has {} of {size} pixels", count_of(rows.len(), "coefficient"));
+            let expected = "at most 1 GiB of patterns: about 100 x 100 pixels";
+            return Err(refused(found, expected.to_owned()));
+        }
+        // Measurements of the same frequencies have the same patterns.
+        let patterns = match found.last() {
+            Some(last) if last.not_read == not_read => Arc::clone(&last.patterns),
+            _ => {
+                let weights = rows.iter().flat_map(|row| row.weights(size)).collect();
+                Arc::new(Patterns { size, count: rows.len(), weights })
+            }
+        };
+        notes.push(match is_spectrum {
+            true => format!("a spectrum of {} frequencies", area - not_read.len()),
+            false => format!("{steps} steps of each frequency: constant light falls out"),
+        });
+        let places = (0..values.len()).collect();
+        found.push(Plain { patterns, values, places, not_read, simulated, notes, dark: false });
     }
-    .map_err(|(found, expected)| refused(found, expected))?;
-    notes.extend(spectrum.center());
-    let not_read: Vec<usize> =
-        (0..spectrum.values.len()).filter(|&at| spectrum.values[at].is_none()).collect();
-    let (size, area) = (spectrum.size, spectrum.size.area());
-    let (rows, values) = spectrum.rows();
-    if values.is_empty() {
-        return Err(refused(
-            "has no frequency that was read".to_owned(),
-            "at least one".to_owned(),
-        ));
+    Ok(found)
+}
+
+/// The measurements along the first axis.
+fn each_of(field: Field) -> Vec<Field> {
+    let several = field.shape.first().copied().unwrap_or(1).max(1);
+    if field.shape.len() < 2 {
+        return vec![field];
     }
-    if (rows.len() * area * size_of::<f64>()) as u64 > MAX_MEMORY_BYTES {
-        let found = format!("has {} of {size} pixels", count_of(rows.len(), "coefficient"));
-        return Err(refused(found, "at most 1 GiB of patterns: about 100 x 100 pixels".to_owned()));
-    }
-    let weights = rows.iter().flat_map(|row| row.weights(size)).collect();
-    let patterns = Patterns { size, count: rows.len(), weights };
-    notes.push(match is_spectrum {
-        true => format!("a spectrum of {} frequencies", area - not_read.len()),
-        false => format!("{steps} steps of each frequency: constant light falls out"),
-    });
-    Ok(Coefficients { patterns, values, not_read, simulated, notes })
+    let each = field.real.len() / several;
+    let part = |values: &[f64], at: usize| values[at * each..(at + 1) * each].to_vec();
+    let of = |at: usize| Field {
+        shape: field.shape[1..].to_vec(),
+        real: part(&field.real, at),
+        imaginary: field.imaginary.as_ref().map(|imaginary| part(imaginary, at)),
+    };
+    (0..several).map(of).collect()
 }
 
 /// The measurement of this index, along the first axis.

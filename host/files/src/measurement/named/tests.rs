@@ -1,7 +1,7 @@
 use super::s_matrix::first_row;
 use super::*;
-use crate::measurement::plain::{Plain, read_plain};
 use crate::measurement::{PatternSelection, Selection};
+use crate::measurement::{Plain, read_plain};
 use crate::testing::{Zip, file, npy_f64, zip};
 use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, OwnMatrix};
 use std::f64::consts::TAU;

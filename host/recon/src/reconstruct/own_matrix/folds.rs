@@ -20,8 +20,8 @@ use rayon::prelude::*;
 /// Part of the patterns' norm below which what is left of them is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Tikhonov's images of all measurements and of the folds, not yet made.
-pub(super) struct Folds<'o> {
+/// What the patterns say of Tikhonov's problem, before any measurement.
+pub(super) struct Products<'o> {
     own: &'o OwnMatrix,
     transform: Transform<Size>,
     /// Squares of the expected sizes; 0 for the mean, which has no penalty.
@@ -32,8 +32,16 @@ pub(super) struct Folds<'o> {
     sums: DVector<f64>,
     /// Squared norm of each pattern.
     energies: DVector<f64>,
-    y: DVector<f64>,
     strengths: Vec<f64>,
+    /// Whether a strength is to be chosen.
+    chooses: bool,
+    dark: bool,
+}
+
+/// Tikhonov's images of all measurements and of the folds, not yet made.
+pub(super) struct Folds<'p> {
+    of: &'p Products<'p>,
+    y: DVector<f64>,
     /// All measurements, then those of each fold.
     parts: Vec<Part>,
 }
@@ -66,10 +74,10 @@ struct Level {
     dark: DarkLevel,
 }
 
-impl<'o> Folds<'o> {
+impl<'o> Products<'o> {
     /// `None` for atoms of one's own or single pixels, and for more patterns than pixels, whose
     /// number is reduced instead.
-    pub(super) fn new(own: &'o OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Option<Self> {
+    pub(super) fn new(own: &'o OwnMatrix, settings: &MatrixSettings) -> Option<Self> {
         let is_ours = settings.atoms.is_none()
             && settings.basis != Basis::Pixel
             && own.patterns() <= own.size.area();
@@ -85,29 +93,36 @@ impl<'o> Folds<'o> {
             values.iter_mut().zip(&sizes).for_each(|(value, size)| *value *= size.sqrt());
             values
         })) * (largest * largest);
-        let mut folds = Self {
+        Some(Self {
             own,
             transform,
             sizes,
             products,
             sums: own.patterns.column_sum(),
             energies: energies(&own.patterns),
-            y: DVector::from_column_slice(y),
             strengths: settings
                 .strength
                 .map_or_else(|| STRENGTHS.to_vec(), |strength| vec![strength]),
-            parts: Vec::new(),
-        };
+            chooses: settings.strength.is_none(),
+            dark: settings.dark,
+        })
+    }
+
+    /// The problem of these measurements.
+    pub(super) fn folds(&self, y: &[f64]) -> Folds<'_> {
+        let mut folds = Folds { of: self, y: DVector::from_column_slice(y), parts: Vec::new() };
         let every: Vec<usize> = (0..y.len()).collect();
-        let mut parts = vec![folds.part(&every, settings.dark)];
-        if settings.strength.is_none() {
-            parts.extend(super::folds(y.len()).map(|(kept, _)| folds.part(&kept, settings.dark)));
+        let mut parts = vec![folds.part(&every, self.dark)];
+        if self.chooses {
+            parts.extend(super::folds(y.len()).map(|(kept, _)| folds.part(&kept, self.dark)));
         }
         folds.solve(&mut parts);
         folds.parts = parts;
-        Some(folds)
+        folds
     }
+}
 
+impl Folds<'_> {
     /// The image of all measurements at the strength that predicts those held back best, or at the
     /// one that was given; and the strength.
     pub(super) fn chosen(&self) -> (Fit, f64) {
@@ -116,7 +131,7 @@ impl<'o> Folds<'o> {
 
     /// Errors of each strength on the held-back measurements: sums of squares.
     pub(super) fn errors(&self) -> Vec<f64> {
-        let strengths = 0..self.strengths.len();
+        let strengths = 0..self.of.strengths.len();
         strengths
             .map(|strength| self.parts[1..].iter().map(|part| self.missed(part, strength)).sum())
             .collect()
@@ -125,25 +140,25 @@ impl<'o> Folds<'o> {
     /// The image of all measurements at the strength of this index, and the strength.
     fn fit(&self, strength: usize) -> (Fit, f64) {
         let whole = &self.parts[0];
-        let level = self.level(whole, &(&self.products * &whole.found[strength]));
-        let weights: DVector<f64> = self.own.patterns.tr_mul(&whole.found[strength]);
+        let level = self.level(whole, &(&self.of.products * &whole.found[strength]));
+        let weights: DVector<f64> = self.of.own.patterns.tr_mul(&whole.found[strength]);
         let unit = weights.amax().max(f64::MIN_POSITIVE);
         let mut image: Vec<f32> = weights.iter().map(|&weight| (weight / unit) as f32).collect();
-        self.transform.analyse(&mut image);
-        image.iter_mut().zip(&self.sizes).for_each(|(value, size)| *value *= size);
-        self.transform.synthesise(&mut image);
+        self.of.transform.analyse(&mut image);
+        image.iter_mut().zip(&self.of.sizes).for_each(|(value, size)| *value *= size);
+        self.of.transform.synthesise(&mut image);
         let pixels = image.iter().map(|&value| f64::from(value) * unit + level.mean);
         let pixels = DVector::from_iterator(image.len(), pixels);
-        (Fit { pixels, dark: level.dark }, self.strengths[strength])
+        (Fit { pixels, dark: level.dark }, self.of.strengths[strength])
     }
 
     fn part(&self, kept: &[usize], fits_dark: bool) -> Part {
         let mut used = DVector::zeros(self.y.len());
         kept.iter().for_each(|&k| used[k] = 1.0);
         let shown = kept.len() as f64;
-        let seen = self.energies.dot(&used);
+        let seen = self.of.energies.dot(&used);
         let rounding = ROUNDING * seen.sqrt();
-        let sums = self.sums.component_mul(&used);
+        let sums = self.of.sums.component_mul(&used);
         let mut free = Vec::new();
         let mut even = sums.clone();
         if fits_dark {
@@ -169,10 +184,10 @@ impl<'o> Folds<'o> {
             if runs.iter().all(Run::has_settled) {
                 break;
             }
-            let seen = product(&self.products, &directions);
+            let seen = product(&self.of.products, &directions);
             for ((run, part), seen) in runs.iter_mut().zip(&*parts).zip(seen) {
                 if !run.has_settled() {
-                    run.advance(part.projected(seen) * run.scale, &self.strengths);
+                    run.advance(part.projected(seen) * run.scale, &self.of.strengths);
                 }
             }
         }
@@ -185,9 +200,9 @@ impl<'o> Folds<'o> {
     fn run(&self, part: &Part) -> Run {
         let y = part.projected(self.y.component_mul(&part.used));
         let shown = part.used.sum();
-        let free: f64 = part.free.iter().map(|free| free.dot(&(&self.products * free))).sum();
-        let energy = self.products.diagonal().dot(&part.used) - free;
-        let largest = self.products.diagonal().max();
+        let free: f64 = part.free.iter().map(|free| free.dot(&(&self.of.products * free))).sum();
+        let energy = self.of.products.diagonal().dot(&part.used) - free;
+        let largest = self.of.products.diagonal().max();
         // What rounding leaves of equal numbers is no contrast.
         let is_flat = y.norm() <= ROUNDING * self.y.component_mul(&part.used).norm()
             || energy <= 1e-7 * shown * largest;
@@ -196,7 +211,7 @@ impl<'o> Folds<'o> {
             true => (0.0, y * 0.0),
             false => (shown / energy, y / spread),
         };
-        Run::new(y, scale, spread * scale, self.strengths.len())
+        Run::new(y, scale, spread * scale, self.of.strengths.len())
     }
 
     /// Mean and dark level that fit the measurements of a part best; `seen` are those of its image
@@ -210,7 +225,7 @@ impl<'o> Folds<'o> {
             Mean::Shared(weight) => Level { mean: offset / weight, dark: DarkLevel::Unknown },
             Mean::Fitted(even) => {
                 let mean = even.dot(&left) / even.norm_squared();
-                let left = left - self.sums.component_mul(&part.used) * mean;
+                let left = left - self.of.sums.component_mul(&part.used) * mean;
                 let dark = match part.fits_dark {
                     true => DarkLevel::Fitted(left.sum() / part.used.sum()),
                     false => DarkLevel::LeftOut,
@@ -222,11 +237,13 @@ impl<'o> Folds<'o> {
 
     /// Squared error of a part's image on the measurements that were held back from it.
     fn missed(&self, part: &Part, strength: usize) -> f64 {
-        let seen = &self.products * &part.found[strength];
+        let seen = &self.of.products * &part.found[strength];
         let level = self.level(part, &seen);
         let held = (0..self.y.len()).filter(|&k| part.used[k] == 0.0);
-        held.map(|k| (self.y[k] - seen[k] - self.sums[k] * level.mean - level.dark.value()).powi(2))
-            .sum()
+        held.map(|k| {
+            (self.y[k] - seen[k] - self.of.sums[k] * level.mean - level.dark.value()).powi(2)
+        })
+        .sum()
     }
 }
 

@@ -6,7 +6,7 @@
 use crate::Size;
 use crate::omp::{DenseDictionary, Limits, OmpError, Solver, Stop, nonnegative};
 use crate::reconstruct::regularised::total_variation::{climb, descend};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
 
 /// The most iterations of iterative methods.
 pub(super) const ITERATIONS: usize = 300;
@@ -36,33 +36,57 @@ pub(super) fn norm(a: &DMatrix<f64>) -> f64 {
     1.02 * norm
 }
 
-/// A problem with at most one row more than it has columns, and `abs(y - A x)` as in this one for
-/// every `x`. With `A^T A = V L V^T` its rows are `L^(1/2) V^T`, with the measurements
-/// `L^(-1/2) V^T A^T y`; what no `x` explains of `y` is the measurement of a last row of zeros. A
-/// problem that is not taller stays as it is.
+/// A problem with at most one row more than it has columns, and `abs(y - A x)` as in a taller one
+/// for every `x`. With `A^T A = V L V^T` its rows are `L^(1/2) V^T`, with the measurements
+/// `L^(-1/2) V^T A^T y`; what no `x` explains of `y` is the measurement of a last row of zeros.
 ///
 /// Singular values below [`SEEN`] times the largest are lost.
-pub(super) fn condensed(a: DMatrix<f64>, y: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-    let columns = a.ncols();
-    let largest = a.amax();
-    if a.nrows() <= columns + 1 || largest == 0.0 {
-        return (a, y);
+pub(super) struct Condensed {
+    /// The taller problem's matrix, in units of its largest weight.
+    relative: DMatrix<f64>,
+    largest: f64,
+    gram: SymmetricEigen<f64, Dyn>,
+}
+
+impl Condensed {
+    /// `None` for a problem that is not taller, which stays as it is.
+    pub(super) fn of(a: &DMatrix<f64>) -> Option<Self> {
+        let largest = a.amax();
+        if a.nrows() <= a.ncols() + 1 || largest == 0.0 {
+            return None;
+        }
+        let relative = a / largest;
+        let gram = (relative.transpose() * &relative).symmetric_eigen();
+        Some(Self { relative, largest, gram })
     }
-    let relative = &a / largest;
-    let gram = (relative.transpose() * &relative).symmetric_eigen();
-    let seen = gram.eigenvectors.tr_mul(&relative.tr_mul(&y));
-    let least = SEEN * SEEN * gram.eigenvalues.max();
-    let mut rows = DMatrix::zeros(columns + 1, columns);
-    let mut values = DVector::zeros(columns + 1);
-    for (k, &energy) in gram.eigenvalues.iter().enumerate() {
-        if energy > least {
-            let singular = energy.sqrt();
-            rows.row_mut(k).tr_copy_from(&(gram.eigenvectors.column(k) * (singular * largest)));
+
+    /// Number and singular value of each direction that is told from rounding.
+    fn seen(&self) -> impl Iterator<Item = (usize, f64)> {
+        let least = SEEN * SEEN * self.gram.eigenvalues.max();
+        let energies = self.gram.eigenvalues.iter().enumerate();
+        energies.filter(move |(_, energy)| **energy > least).map(|(k, energy)| (k, energy.sqrt()))
+    }
+
+    pub(super) fn rows(&self) -> DMatrix<f64> {
+        let columns = self.relative.ncols();
+        let mut rows = DMatrix::zeros(columns + 1, columns);
+        for (k, singular) in self.seen() {
+            let direction = self.gram.eigenvectors.column(k) * (singular * self.largest);
+            rows.row_mut(k).tr_copy_from(&direction);
+        }
+        rows
+    }
+
+    pub(super) fn values(&self, y: &DVector<f64>) -> DVector<f64> {
+        let columns = self.relative.ncols();
+        let seen = self.gram.eigenvectors.tr_mul(&self.relative.tr_mul(y));
+        let mut values = DVector::zeros(columns + 1);
+        for (k, singular) in self.seen() {
             values[k] = seen[k] / singular;
         }
+        values[columns] = (y.norm_squared() - values.norm_squared()).max(0.0).sqrt();
+        values
     }
-    values[columns] = (y.norm_squared() - values.norm_squared()).max(0.0).sqrt();
-    (rows, values)
 }
 
 /// Least squares with least norm: conjugate gradients from 0 stay in the row space.
@@ -107,22 +131,27 @@ pub(super) fn smoothest(size: Size, image: &DVector<f64>, ghost: &DVector<f64>) 
     (own > 1e-12 * ghost.norm_squared()).then_some(shared / own)
 }
 
+/// `A S^2 A^T`.
+pub(super) fn scaled_gram(a: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> {
+    let mut scaled = a.clone();
+    scaled.column_iter_mut().zip(scale.iter()).for_each(|(mut atom, s)| atom *= *s);
+    &scaled * scaled.transpose()
+}
+
 /// Coefficients by the dual problem, `(A S^2 A^T + t) z = y` and `c = S^2 A^T z`, which has as many
-/// unknowns as measurements.
+/// unknowns as measurements. `gram` is [`scaled_gram`].
 pub(super) fn tikhonov(
     a: &DMatrix<f64>,
+    gram: &DMatrix<f64>,
     y: &DVector<f64>,
     scale: &DVector<f64>,
     strengths: &[f64],
 ) -> Vec<DVector<f64>> {
-    let mut scaled = a.clone();
-    scaled.column_iter_mut().zip(scale.iter()).for_each(|(mut atom, s)| atom *= *s);
-    let gram = &scaled * scaled.transpose();
     let mut z = DVector::zeros(y.len());
     strengths
         .iter()
         .map(|&strength| {
-            let operate = |z: &DVector<f64>| &gram * z + z * strength;
+            let operate = |z: &DVector<f64>| gram * z + z * strength;
             let mut residual = y - operate(&z);
             let mut direction = residual.clone();
             let mut energy = residual.norm_squared();
@@ -137,7 +166,7 @@ pub(super) fn tikhonov(
                 let before = std::mem::replace(&mut energy, residual.norm_squared());
                 direction = &residual + &direction * (energy / before);
             }
-            scaled.tr_mul(&z).component_mul(scale)
+            a.tr_mul(&z).component_mul(scale).component_mul(scale)
         })
         .collect()
 }
@@ -234,23 +263,26 @@ pub(super) struct Chosen {
     pub stop: Stop,
 }
 
-/// Algorithm 1 over atoms scaled by their expected sizes, with a row of noise for each atom.
-pub(super) fn omp(
-    a: &DMatrix<f64>,
-    y: &DVector<f64>,
-    scale: &DVector<f64>,
-    noise: f64,
-    sparsities: &[usize],
-    non_negative: bool,
-) -> Result<Vec<Chosen>, OmpError> {
+/// Atoms scaled by their expected sizes, with a row of noise for each atom.
+pub(super) fn ridged(a: &DMatrix<f64>, scale: &DVector<f64>, noise: f64) -> DenseDictionary<f64> {
     let (rows, atoms) = a.shape();
     let ridge = noise.sqrt();
-    let matrix = DMatrix::from_fn(rows + atoms, atoms, |m, k| match m.checked_sub(rows) {
+    DenseDictionary::new(&DMatrix::from_fn(rows + atoms, atoms, |m, k| match m.checked_sub(rows) {
         None => a[(m, k)] * scale[k],
         Some(other) if other == k => ridge,
         Some(_) => 0.0,
-    });
-    let dictionary = DenseDictionary::new(&matrix);
+    }))
+}
+
+/// Algorithm 1 over [`ridged`] atoms.
+pub(super) fn omp(
+    dictionary: &DenseDictionary<f64>,
+    y: &DVector<f64>,
+    scale: &DVector<f64>,
+    sparsities: &[usize],
+    non_negative: bool,
+) -> Result<Vec<Chosen>, OmpError> {
+    let (rows, atoms) = (y.len(), scale.len());
     let mut measured = y.as_slice().to_vec();
     measured.resize(rows + atoms, 0.0);
     let chosen = |support: &[usize], coefficients: &[f64], stop| {
@@ -262,13 +294,13 @@ pub(super) fn omp(
     };
     if non_negative {
         let solve = |&sparsity: &usize| {
-            let found = nonnegative::solve(&dictionary, &measured, &Limits::atoms(sparsity))?;
+            let found = nonnegative::solve(dictionary, &measured, &Limits::atoms(sparsity))?;
             Ok(chosen(&found.support, &found.coefficients, found.stop))
         };
         return sparsities.iter().map(solve).collect();
     }
     let longest = Limits::atoms(*sparsities.last().unwrap_or(&0));
-    let path = Solver::new(&dictionary, &longest)?.solve(&measured)?;
+    let path = Solver::new(dictionary, &longest)?.solve(&measured)?;
     let first = |&atoms: &usize| {
         let size = atoms.min(path.support.len());
         chosen(&path.support[..size], &path.coefficients(size), path.stop)

@@ -1,8 +1,9 @@
 //! The fast way to Tikhonov's images, beside the one that all penalties have.
 
-use super::super::folds::Folds;
+use super::super::folds::Products;
 use super::super::gram::{are_independent, gram};
-use super::super::problem::Problem;
+use super::super::many::Many;
+use super::super::problem::Prepared;
 use super::super::{MatrixMethod, MatrixSettings, OwnMatrix, Penalty, STRENGTHS, images, rank};
 use super::{normal, patterns, scene, seen, side};
 use nalgebra::DMatrix;
@@ -19,21 +20,23 @@ fn all_folds_at_once_give_what_each_alone_gives() {
         let y: Vec<f64> = seen(&weights, &image, 0.05).iter().map(|y| 1e-3 * y + 0.04).collect();
         let method = MatrixMethod::Penalty(Penalty::Tikhonov);
         let settings = MatrixSettings { dark, ..MatrixSettings::new(method) };
-        let alone = own
-            .errors(&y, &settings, STRENGTHS.len(), |problem| {
-                Ok(problem.penalised(Penalty::Tikhonov, &STRENGTHS))
+        let alone = Many::new(&own, &settings, &[&y])
+            .errors(method, &[0], |prepared| {
+                Ok(vec![prepared.problem(&y).penalised(Penalty::Tikhonov, &STRENGTHS)])
             })
-            .unwrap();
-        let folds = Folds::new(&own, &y, &settings).unwrap();
+            .unwrap()
+            .remove(0);
+        let products = Products::new(&own, &settings).unwrap();
+        let folds = products.folds(&y);
         let case = format!("kind {kind}, {count} patterns, dark {dark}");
         for (k, (one, all)) in alone.iter().zip(folds.errors()).enumerate() {
             assert!((all / one - 1.0).abs() < 0.02, "{case}, {}: {one}, {all}", STRENGTHS[k]);
         }
         let every: Vec<usize> = (0..y.len()).collect();
-        let whole = Problem::new(&own, &settings, &y, &every).unwrap();
+        let whole = Prepared::new(&own, &settings, every).unwrap();
         let (found, strength) = folds.chosen();
         let at = STRENGTHS.iter().position(|&known| known == strength).unwrap();
-        let expected = whole.penalised(Penalty::Tikhonov, &STRENGTHS).remove(at);
+        let expected = whole.problem(&y).penalised(Penalty::Tikhonov, &STRENGTHS).remove(at);
         let apart = (&found.pixels - &expected.pixels).norm() / expected.pixels.norm();
         assert!(apart < 2e-3, "{case}: {apart}");
         let (dark, other) = (found.dark.value(), expected.dark.value());

@@ -1,0 +1,31 @@
+//! Readings with the weights of their patterns, which are a user's own.
+
+use super::patterns::Patterns;
+use std::sync::Arc;
+
+/// Readings of patterns of a user's own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plain {
+    /// What the readings weigh the light with: all patterns, those that were not read included.
+    pub patterns: Arc<Patterns>,
+    /// The readings, all finite.
+    pub values: Vec<f64>,
+    /// The pattern of each reading.
+    pub places: Vec<usize>,
+    /// Patterns that were not read: the file has NaN, or an instrument's word for overload.
+    pub not_read: Vec<usize>,
+    /// Whether the file says that no real light was measured; `None` if it does not say.
+    pub simulated: Option<bool>,
+    /// What people may not expect, one line each.
+    pub notes: Vec<String>,
+    /// Whether the values may hold a constant dark level.
+    pub dark: bool,
+}
+
+/// Which measurements of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Which {
+    /// That of [`Selection::index`](super::Selection::index).
+    One,
+    All,
+}

@@ -1,0 +1,50 @@
+//! Many measurements by the same patterns.
+
+use super::super::{BATCH, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
+use super::{METHODS, patterns, scene, seen, side};
+use crate::Basis;
+
+/// Measurements that differ in scene, noise and size, and one of no light.
+fn measurements(weights: &[f64]) -> Vec<Vec<f64>> {
+    let mut all: Vec<Vec<f64>> = [(0, 0.02, 1.0), (1, 0.5, 1e-3), (2, 0.1, 40.0)]
+        .map(|(number, noise, unit)| {
+            let y = seen(weights, &scene(side(8), number), noise);
+            y.iter().map(|y| unit * y + 3.0).collect()
+        })
+        .to_vec();
+    all.push(vec![7.0; weights.len() / 64]);
+    all
+}
+
+/// Fewer patterns than pixels, more, and orthogonal ones.
+#[test]
+fn images_are_those_of_each_alone() {
+    for (kind, count) in [(0, 40), (0, 90), (1, 64)] {
+        let weights = patterns(kind, count, 64, 4);
+        let own = OwnMatrix::new(side(8), &weights).unwrap();
+        let measured = measurements(&weights);
+        let all: Vec<&[f64]> = measured.iter().map(Vec::as_slice).collect();
+        for method in METHODS.into_iter().chain([MatrixMethod::Best]) {
+            for (basis, dark) in [(Basis::Dct, true), (Basis::Pixel, false)] {
+                let settings = MatrixSettings { basis, dark, ..MatrixSettings::new(method) };
+                let together = own.reconstruct_all(&all, &settings).unwrap();
+                let alone: Vec<_> =
+                    all.iter().map(|y| own.reconstruct(y, &settings).unwrap()).collect();
+                assert!(together == alone, "kind {kind}, {count} patterns, {method:?}, {basis}");
+            }
+        }
+    }
+}
+
+#[test]
+fn any_number_of_measurements_is_taken() {
+    let weights = patterns(0, 40, 64, 4);
+    let own = OwnMatrix::new(side(8), &weights).unwrap();
+    let y = measurements(&weights).remove(0);
+    let settings = MatrixSettings::new(MatrixMethod::Penalty(Penalty::Tikhonov));
+    let many = own.reconstruct_all(&vec![&y[..]; BATCH + 1], &settings).unwrap();
+    assert_eq!((many.len(), &many[BATCH]), (BATCH + 1, &many[0]));
+    assert_eq!(own.reconstruct_all(&[], &settings), Ok(Vec::new()));
+    let short = own.reconstruct_all(&[&y, &y[1..]], &settings);
+    assert_eq!(short, Err(MatrixError::Length { found: 39, expected: 40 }));
+}
