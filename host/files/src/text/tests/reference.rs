@@ -1,7 +1,9 @@
 //! The reader as it was before it became fast: the same text must give the same table.
 
-use super::export::{Found, LEAST_LINES, MOST_AFTER, MOST_BEFORE, UNITS};
-use super::{EXPECTED, Field, FileError, Numbers, OVERLOAD, OVERLOADED, Text, UNREAD, is_heading};
+use super::super::export::{Found, LEAST_LINES, MOST_AFTER, MOST_BEFORE, UNITS};
+use super::super::{
+    EXPECTED, Field, FileError, Numbers, OVERLOAD, OVERLOADED, Text, UNREAD, is_heading,
+};
 use nirspi_recon::words::count_of;
 use std::path::Path;
 
