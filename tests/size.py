@@ -2,9 +2,9 @@
 
 usage: python3 tests/size.py
 
-Lines are lines of Rust in files that git knows. Those without tests leave out folders and files named `tests`, and what
-stands behind `#[cfg(test)] mod tests {`. A locked crate is a name in a Cargo.lock. That no two modules and no two crates use
-each other is a test: tests/tests/dependencies.rs.
+Lines are lines of Rust in files that git knows. Those without tests leave out folders and files named `tests` or `testing`,
+and what stands behind `#[cfg(test)] mod tests {`. A locked crate is a name in a Cargo.lock. That no two modules and no two
+crates use each other is a test: tests/tests/dependencies.rs.
 """
 import pathlib
 import re
@@ -12,7 +12,7 @@ import subprocess
 import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-TESTS = "\n#[cfg(test)]\nmod tests {"
+TESTS = re.compile(r"\n#\[cfg\(test\)\]\n(?:pub\(crate\) )?mod tests \{")
 
 
 def tracked(*patterns: str) -> list[pathlib.Path]:
@@ -22,11 +22,15 @@ def tracked(*patterns: str) -> list[pathlib.Path]:
     return [ROOT / name for name in names if name]
 
 
+def is_test(file: pathlib.Path) -> bool:
+    """Whether a file of a crate holds tests alone, or what they share."""
+    return bool({"tests", "testing"} & set(file.with_suffix("").parts))
+
+
 def lines_without_tests(crate: pathlib.Path) -> int:
     """Lines of a crate's sources."""
-    folder = ROOT / crate
-    files = [file for file in tracked(f"{crate}/src/*.rs") if "tests" not in file.relative_to(folder).with_suffix("").parts]
-    return sum(file.read_text().split(TESTS)[0].count("\n") for file in files)
+    files = [file for file in tracked(f"{crate}/src/*.rs") if not is_test(file.relative_to(ROOT / crate))]
+    return sum(TESTS.split(file.read_text())[0].count("\n") for file in files)
 
 
 def main() -> None:
