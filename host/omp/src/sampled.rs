@@ -84,7 +84,7 @@ impl<'a> SampledHadamard<'a> {
     /// The atoms of `transform`'s basis, measured by `rows`.
     ///
     /// # Panics
-    /// If a row is not one of `0..side^2` (rows of a [`crate::Measurements`] always are), or
+    /// If a row is not one of `0..side^2` (those of `nirspi_patterns::Rows` always are), or
     /// `prior` does not have one scale for each atom.
     #[must_use]
     pub fn new(transform: &'a Transform, rows: &[u32], prior: &'a Prior) -> Self {

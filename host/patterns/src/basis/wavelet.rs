@@ -32,7 +32,7 @@ pub(crate) fn split(taps: &[f32], line: &[f32], out: &mut [f32]) {
     }
 }
 
-/// The inverse, and transpose, of [`split`].
+/// A step back along a line: the inverse, and transpose, of the step that gives its smooth half, then its detail half.
 pub fn merge(taps: &[f32], line: &[f32], out: &mut [f32]) {
     let size = line.len();
     let (smooth, detail) = line.split_at(size / 2);
