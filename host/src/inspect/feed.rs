@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn patterns_of_the_benchs_own_are_not_guessed() {
+    fn own_patterns_of_a_bench_are_not_guessed() {
         let found =
             inspected(r#"{"height":2,"width":3,"patterns":4,"readings":"single"}"#, &[1.0; 4]);
         assert!(found.guesses.is_empty() && found.feed.unwrap().declared.is_none());
