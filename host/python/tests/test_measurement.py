@@ -309,9 +309,11 @@ def test_all_on_readings_correct_a_lamp_that_drifts(tmp_path):
     options = {"readings": "single", "divide_by_lamp": True}
     as_it_is = ns.load(tmp_path / "drifts.npz", readings="single")
     assert any("the lamp drifts by" in note for note in as_it_is.notes)
-    steady, image = scene - scene.mean(), ns.reconstruct(tmp_path / "drifts.npz", **options)
-    assert ns.metrics.correlation(steady, image) > 0.999
-    assert ns.metrics.correlation(steady, ns.reconstruct(as_it_is)) < 0.99
+    # A scene of random pixels looks like noise to the other methods.
+    corrected = ns.reconstruct(tmp_path / "drifts.npz", method="hadamard", **options)
+    steady = scene - scene.mean()
+    assert ns.metrics.correlation(steady, corrected) > 0.999
+    assert ns.metrics.correlation(steady, ns.reconstruct(as_it_is, method="hadamard")) < 0.99
 
 
 def test_sums_of_pairs_correct_a_lamp_that_drifts(tmp_path, random):
