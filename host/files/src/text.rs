@@ -405,7 +405,7 @@ const LONGEST_WORD: usize = 8;
 /// What is no plain number.
 #[inline(never)]
 fn odd_number(word: &str, decimal: char) -> Option<f64> {
-    // Most words are none of these.
+    // A long word is an exponent of Fortran or what NumPy prints, or no number.
     let has_exponent = || word.bytes().any(|byte| matches!(byte, b'd' | b'D'));
     if word.len() > LONGEST_WORD
         && word.is_ascii()

@@ -265,7 +265,7 @@ fn add_product(inner: usize, columns: usize, a: &[f32], b: &[f32], out: &mut [f3
     }
 }
 
-/// The orthonormal cosine of DCT type II over `n` pixels, with so many half periods, at a pixel.
+/// Value at a pixel of the orthonormal cosine (DCT type II) that has `frequency` half periods over `n` pixels.
 #[must_use]
 pub fn cosine(n: usize, frequency: usize, pixel: usize) -> f64 {
     let scale = if frequency == 0 { 1.0 } else { 2.0 } / n as f64;

@@ -13,14 +13,14 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// The fewest lines of such a table. Fewer may be anything.
-pub(super) const LEAST_LINES: usize = 8;
+const LEAST_LINES: usize = 8;
 
 /// The most lines before the table, and after it.
-pub(super) const MOST_BEFORE: usize = 64;
-pub(super) const MOST_AFTER: usize = 3;
+const MOST_BEFORE: usize = 64;
+const MOST_AFTER: usize = 3;
 
 /// Words for units below a heading, in brackets or without.
-pub(super) const UNITS: [&str; 20] = [
+const UNITS: [&str; 20] = [
     "s", "ms", "us", "ns", "sec", "second", "seconds", "v", "mv", "uv", "volt", "volts", "a", "ma",
     "w", "mw", "hz", "db", "sequence", "counts",
 ];

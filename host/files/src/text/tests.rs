@@ -1,5 +1,3 @@
-mod reference;
-
 use super::*;
 use crate::testing::{file, line};
 use proptest::collection::vec;
@@ -14,170 +12,72 @@ fn table(content: &str) -> (Vec<usize>, Vec<f64>) {
     }
 }
 
-/// A table as bits, because NaN differs from itself; or the refusal.
-fn seen(read: Result<Text, FileError>) -> String {
-    let bits = |field: &Field| -> Vec<u64> { field.real.iter().map(|v| v.to_bits()).collect() };
-    match read {
-        Err(error) => error.to_string(),
-        Ok(Text { numbers: Numbers::Table(field), skipped }) => {
-            format!("{:?} {:?} {skipped:?}", field.shape, bits(&field))
-        }
-        Ok(Text { numbers: Numbers::Columns(columns), skipped }) => {
-            let columns: Vec<_> =
-                columns.iter().map(|(name, field)| (name, &field.shape, bits(field))).collect();
-            format!("{columns:?} {skipped:?}")
-        }
-    }
-}
-
-const CELLS: [&str; 40] = [
-    "1",
-    "1.5",
-    "-2",
-    "3e-1",
-    "1,5",
-    "0,05",
-    "2,5E-3",
-    "nan",
-    "NaN",
-    "null",
-    "",
-    " ",
-    "#N/A",
-    "-1.#IND",
-    "OL",
-    "overload",
-    "∞",
-    "-∞",
-    "−3",
-    "1.25D+01",
-    "np.float64(1.5)",
-    "\"7\"",
-    "\"a, b\"",
-    "word",
-    "two words",
-    "10:00:01",
-    "1.5.2",
-    "+4",
-    ".5",
-    "inf",
-    "-inf",
-    "d",
-    "1d",
-    "0x10",
-    "1_000",
-    "\u{a0}6",
-    "µV",
-    "(V)",
-    "Volt",
-    "\"",
-];
-
-fn text() -> impl Strategy<Value = String> {
-    let cell = prop_oneof![6 => "[0-9]{1,3}(\\.[0-9]{1,3})?", 1 => select(&CELLS[..]).prop_map(str::to_owned)];
-    let mark = select(&[",", ";", "\t", " ", ", ", ";\t", "  "][..]);
-    let end = select(&["\n", "\r\n", "\r", " \n"][..]);
-    let lines = vec(vec(cell, 1..5), 1..24);
-    let width = prop_oneof![4 => (1_usize..5).prop_map(Some), 1 => Just(None)];
-    let before = vec("[ -~µ]{0,20}", 0..4);
-    (lines, width, mark, end, before, 0_u8..8).prop_map(|(lines, width, mark, end, before, odd)| {
-        let mut text = String::new();
-        if odd & 1 == 1 {
-            before.iter().for_each(|line| text += &format!("{line}{end}"));
-        }
-        if odd == 6 {
-            text = format!("sep={mark}{end}{text}");
-        }
-        for cells in lines {
-            let cells = match width {
-                Some(width) => cells.iter().cycle().take(width).cloned().collect(),
-                None => cells,
-            };
-            text += &cells.join(mark);
-            if odd & 2 == 2 {
-                text += mark;
-            }
-            text += end;
-        }
-        text
-    })
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(4000))]
+    /// Whatever the marks between and behind numbers, the ends of lines, and the lines before the table.
     #[test]
-    fn a_text_gives_the_table_of_the_simple_reader(text in text(), decimal_comma: bool) {
-        let path = Path::new("y.csv");
-        let fast = seen(read_str(path, text.clone(), decimal_comma));
-        prop_assert_eq!(fast, seen(reference::read(path, &text, decimal_comma)));
+    fn a_table_is_read_as_it_was_written(
+        numbers in vec(-1e4_f64..1e4, 1..60),
+        width in 1_usize..5,
+        mark in select(&[", ", ";", "\t", " ", ";\t", "  "][..]),
+        end in select(&["\n", "\r\n", "\r", " \n"][..]),
+        is_closed: bool,
+        is_headed: bool,
+    ) {
+        let rows: Vec<&[f64]> = numbers.chunks_exact(width).collect();
+        prop_assume!(!rows.is_empty());
+        let line = |row: &[f64]| row.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>().join(mark);
+        let close = if is_closed && mark == ";" { mark } else { "" };
+        let mut text = if is_headed { format!("# a log{end}") } else { String::new() };
+        rows.iter().for_each(|row| text += &format!("{}{close}{end}", line(row)));
+        let read = read_str(Path::new("y.csv"), text, false).unwrap();
+        let Numbers::Table(found) = read.numbers else { panic!("a table") };
+        prop_assert_eq!(found.shape, [rows.len(), width]);
+        prop_assert_eq!(found.real, rows.concat());
     }
-}
 
-/// Processor time and time of the reader and of the simple one, in MB/s of a text of 100 MB, medians of five in turn:
-/// `cargo test --release -p nirspi-files --lib text_a_second -- --ignored --nocapture`
-#[test]
-#[ignore = "takes minutes, and prints figures"]
-fn text_a_second() {
-    fn processor_s() -> f64 {
-        let stat = std::fs::read_to_string("/proc/self/stat").unwrap();
-        let fields = stat.rsplit_once(") ").unwrap().1.split(' ');
-        fields.skip(11).take(2).map(|ticks| ticks.parse::<f64>().unwrap() / 100.0).sum()
-    }
-    fn median(mut of: Vec<f64>) -> f64 {
-        of.sort_by(f64::total_cmp);
-        of[of.len() / 2]
-    }
-    let value = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 8) * 1e-5;
-    let one: String = (0..11_000_000).map(|k| format!("{:.4}\n", value(k) % 1000.0)).collect();
-    let row = |k: u32| {
-        let [a, b, c, d] = [1, 2, 3, 4].map(|j| value(k * j) % 10.0);
-        format!("{:.6},{a:.5},{b:.5},{c:.5},{d:.5}\n", f64::from(k) * 1e-6)
-    };
-    let five: String = (0..2_700_000).map(row).collect();
-    let five = format!("Model,X1\nDate,today\n\ntime,CH1,CH2,CH3,CH4\ns,V,V,V,V\n{five}");
-    let path = Path::new("y.csv");
-    for (name, text) in [("one column", one), ("five columns, preamble", five)] {
-        let mut times = [const { Vec::new() }; 4];
-        for _ in 0..5 {
-            for (at, is_fast) in [(0, true), (2, false)] {
-                let given = text.clone();
-                let (processor, began) = (processor_s(), std::time::Instant::now());
-                let found = match is_fast {
-                    true => read_str(path, given, false),
-                    false => reference::read(path, &given, false),
-                };
-                times[at + 1].push(began.elapsed().as_secs_f64());
-                times[at].push(processor_s() - processor);
-                found.unwrap();
+    /// A refusal names a line; nothing else is lost or panics.
+    #[test]
+    fn any_text_is_read_or_refused(text in "([0-9.,;\\-eE \t\"a#%µ∞]{0,12}\r?\n){0,24}", decimal_comma: bool) {
+        match read_str(Path::new("y.csv"), text, decimal_comma) {
+            Ok(Text { numbers: Numbers::Table(field), .. }) => {
+                prop_assert_eq!(field.shape.iter().product::<usize>(), field.real.len());
             }
+            Ok(Text { numbers: Numbers::Columns(columns), .. }) => {
+                let length = columns[0].1.real.len();
+                prop_assert!(columns.iter().all(|(_, field)| field.real.len() == length));
+            }
+            Err(error) => prop_assert!(error.to_string().starts_with("y.csv: ")),
         }
-        let megabytes = text.len() as f64 * 1e-6;
-        let [a, b, c, d] = times.map(|times| megabytes / median(times));
-        println!(
-            "{name}, {megabytes:.0} MB: processor {a:.0} MB/s, time {b:.0} MB/s; before {c:.0}, {d:.0}"
-        );
     }
 }
 
 /// Lines of many pieces and blocks, and an error in one of the last.
 #[test]
-fn a_long_text_gives_the_table_of_the_simple_reader() {
-    let row = |k: usize| format!("{k},{}.{:02},{}\n", k % 777, k % 100, k * k % 1001);
-    let plain: String = (0..140_000).map(row).collect();
-    assert!(plain.len() > 2 * PIECE);
+fn a_long_text_is_one_table_and_its_first_error_is_told() {
+    const LINES: usize = 140_000;
+    let of = |k: usize| [(k % 777) as f64, (k % 100) as f64 / 4.0, (k * k % 1001) as f64];
+    let row = |k: usize| of(k).map(|v| v.to_string()).join(",") + "\n";
+    let plain: String = (0..LINES).map(row).collect();
+    assert!(plain.len() > PIECE && LINES > 2 * BLOCK);
     let path = Path::new("y.csv");
-    let wrong = plain.clone() + "1,2\n" + &plain + "x,2,3\n";
-    let word = plain.clone() + "1,two,3\n1,2\n" + &plain;
-    for text in [
-        plain.clone(),
-        format!("# log\nt,a,b\n{plain}"),
-        format!("A meter\nmade: today\n\nt,a,b\n{plain}total,of,all\n"),
-        wrong,
-        word,
-    ] {
-        let simple = seen(reference::read(path, &text, false));
-        assert!(seen(read_str(path, text, false)) == simple, "{simple:.200}");
+    let read = |text: String| read_str(path, text, false);
+    let numbers: Vec<f64> = (0..LINES).flat_map(of).collect();
+    let Numbers::Table(found) = read(plain.clone()).unwrap().numbers else { panic!("a table") };
+    assert!(found.shape == [LINES, 3] && found.real == numbers);
+    for before in ["# log\nt,a,b\n", "A meter\nmade: today\n\nt,a,b\n"] {
+        let headed = read(format!("{before}{plain}")).unwrap().numbers;
+        let Numbers::Columns(columns) = headed else { panic!("columns") };
+        for (at, (name, field)) in columns.iter().enumerate() {
+            assert_eq!(name, ["t", "a", "b"][at]);
+            assert!(field.real.iter().copied().eq((0..LINES).map(|k| of(k)[at])), "{name}");
+        }
     }
+    let wrong = plain.clone() + "1,2\n" + &plain + "x,2,3\n";
+    let told = read(wrong).err().unwrap().to_string();
+    assert!(told.contains("2 numbers in line 140001"), "{told}");
+    let word = plain.clone() + "1,two,3\n1,2\n" + &plain;
+    let told = read(word).err().unwrap().to_string();
+    assert!(told.contains("\"two\" in line 140001"), "{told}");
 }
 
 #[test]
