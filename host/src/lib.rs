@@ -45,7 +45,7 @@ pub mod moving;
 pub mod patterns;
 #[cfg(feature = "pictures")]
 pub mod picture;
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "enhance", feature = "pictures", not(target_family = "wasm")))]
 pub mod reconstruct;
 #[cfg(feature = "pictures")]
 pub mod scene;

@@ -25,12 +25,14 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use thiserror::Error;
 
+mod batches;
 mod halves;
 mod recording;
 mod several;
 
+pub use batches::{Batches, Sources};
+use recording::from_recording;
 pub(crate) use recording::of_sum;
-use recording::{frames_of_recording, from_recording};
 pub use several::Several;
 
 /// How to read measurements.
@@ -210,6 +212,9 @@ pub enum SourceError {
         #[source]
         misfit: Misfit,
     },
+    /// The recording changed between two readings.
+    #[error("{}: the recording changed while it was read: wait until its capture has ended", .0.display())]
+    Changed(PathBuf),
     /// The options are for measurement files, but the file is a recording.
     #[error(
         "--index N, --part, and what says how a file is laid out belong to measurement files, not to recordings"
@@ -336,10 +341,10 @@ impl Source {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn read_all(path: &Path, options: &SourceOptions) -> Result<Vec<Self>, SourceError> {
-        if options.fits_recording(path)? {
-            return frames_of_recording(path, options);
-        }
-        Several::open(path, options)?.each()
+        let mut sources = Sources::open(path, options)?;
+        sources.fit_together()?;
+        let batches: Vec<Vec<Self>> = sources.batches(usize::MAX)?.collect::<Result<_, _>>()?;
+        Ok(batches.into_iter().flatten().collect())
     }
 
     /// The measurements, for uses that need real ones.

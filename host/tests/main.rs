@@ -10,3 +10,5 @@ mod recordings;
 mod replay;
 mod session;
 mod split;
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+mod stacks;

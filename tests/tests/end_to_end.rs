@@ -4,9 +4,9 @@
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
-use nirspi::integrate::{Integrated, KnownOfRun};
+use nirspi::integrate::Integrated;
 use nirspi::link::Link;
-use nirspi::recording::{Recording, RecordingError, Target, frames_of_recording, tally_recording};
+use nirspi::recording::{Recording, RecordingError, Target, hear_recording, tally_recording};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::signal::Signal;
@@ -278,8 +278,12 @@ fn a_frame_of_one_sweep_is_corrected_by_what_its_run_tells() {
     run(Box::new(MemoryLink::new(optics.camera(1).unwrap())), &options);
     let mut recording = Recording::open(&path).unwrap();
     let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
-    let fits = |_| Ok::<(), RecordingError>(());
-    let (frames, tally) = frames_of_recording(&mut recording, fits).unwrap();
+    let mut frames = Vec::new();
+    let tally = hear_recording(&mut recording, |heard, _| {
+        frames.extend(heard.frame().map(|frame| Integrated::of_frame(&setup, frame)));
+        Ok::<(), RecordingError>(())
+    });
+    let tally = tally.unwrap();
     let first_pixel = |frame: &Integrated| {
         let measured = frame.measurements(&setup, settling.as_ref(), false).unwrap();
         let image = reconstruct::hadamard(&measured);
@@ -288,9 +292,9 @@ fn a_frame_of_one_sweep_is_corrected_by_what_its_run_tells() {
     let whole = first_pixel(tally.integrated());
     assert!((whole - 1.0).abs() < 0.1, "{whole}");
     for (at, frame) in frames.iter().enumerate() {
-        let corrected = first_pixel(frame);
+        let corrected = first_pixel(&frame.clone().of_run(&tally.known()));
         assert!((corrected - 1.0).abs() < 0.4, "{at}: {corrected}");
-        let alone = first_pixel(&frame.clone().of_run(&KnownOfRun::default()));
+        let alone = first_pixel(frame);
         assert!((alone - 1.0).abs() > 1.0, "{at}: {alone}");
     }
 }

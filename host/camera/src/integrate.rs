@@ -54,6 +54,14 @@ impl Integrated {
         Self::of_patterns(setup.rows.len())
     }
 
+    /// One frame alone.
+    #[must_use]
+    pub fn of_frame(setup: &MeasurementSetup, frame: &Frame<'_>) -> Self {
+        let mut alone = Self::new(setup);
+        alone.add(frame);
+        alone
+    }
+
     pub(crate) fn of_patterns(patterns: usize) -> Self {
         Self {
             sums: vec![0; patterns],

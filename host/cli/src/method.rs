@@ -4,7 +4,8 @@ use super::Usage;
 use super::report::words;
 use anyhow::Result;
 use clap::{Args, FromArgMatches};
-use nirspi::reconstruct::{Recipe, Solver, own_atoms, read_atoms};
+use nirspi::imaging::Enhance;
+use nirspi::reconstruct::{Pipeline, Recipe, Solver, own_atoms, read_atoms};
 use nirspi::source::FirstPatterns;
 use nirspi_nets::Device;
 use nirspi_recon::omp::Backend;
@@ -125,11 +126,20 @@ impl MethodArgs {
         Ok(MethodSettings { dictionary, ..self.settings()? })
     }
 
-    /// The method, ready for measurements of any side.
-    pub fn solver(&self, first: FirstPatterns, sampling: Sampling) -> Result<Solver> {
+    /// The method, ready for measurements of any side, with networks after it, if these are wanted.
+    pub fn pipeline(
+        &self,
+        first: FirstPatterns,
+        sampling: Sampling,
+        enhance: bool,
+    ) -> Result<Pipeline> {
         let (method, settings, dictionary) =
             (self.method, self.settings()?, self.dictionary.clone());
-        Ok(Solver::new(Recipe { method, settings, dictionary, first, sampling })?)
+        let solver = Solver::new(Recipe { method, settings, dictionary, first, sampling })?;
+        Ok(match enhance {
+            true => Pipeline::new(solver).with_networks(Enhance::built_in(&self.device()?)?),
+            false => Pipeline::new(solver),
+        })
     }
 
     /// The device of the networks: the backend of OMP. `auto` is the processor, as one image at a time is too

@@ -1,6 +1,5 @@
 //! `nirspi reconstruct`: an image from measurements of nirspi or of another lab.
 
-mod many;
 mod matrix;
 mod stack;
 
@@ -9,12 +8,12 @@ use super::method::MethodArgs;
 use super::progress::Progress;
 use super::provenance::made;
 use super::report::{FigureArgs, ReportArgs, StageTimes, stages};
-use super::source::SourceArgs;
+use super::source::{SourceArgs, usage_or_failure};
 use super::{Usage, print};
 use anyhow::Result;
 use nirspi::files::output::OutputDir;
 use nirspi::imaging::Enhance;
-use nirspi::reconstruct::{OneError, OneImage, OneReport, one_image as one};
+use nirspi::reconstruct::{OneReport, Pipeline, PipelineError, ResultFolder};
 use nirspi::source::{FirstPatterns, Index, Source};
 use nirspi_recon::{Sampling, Size};
 use std::path::{Path, PathBuf};
@@ -93,25 +92,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check()?;
     OutputDir::create(&args.out)?.check(["image.npy", "report.json"])?;
     if args.source.input.is_dir() || !args.more.is_empty() {
-        return many::run(args, first);
+        return stack::of_files(args, first);
     }
     if let Some(path) = &args.matrix {
         return matrix::run(args, path);
     }
     if args.source.index == Some(Index::All) {
-        return stack::run(args, first);
+        return stack::of_file(args, first);
     }
     if args.warm_start {
         return Err(Usage("--warm-start belongs to --index all".to_owned()).into());
     }
     let mut times = stages();
     let source = times.time("read", || args.source.load())?;
-    let solver = args.method.solver(first, args.sampling)?;
-    let (input, enhance, out) = (&*args.source.input, args.enhance, &*args.out);
-    let made = made();
-    let figure = args.figure.figure;
-    let request = OneImage { input, solver: &solver, enhance, out, made, figure };
-    let report = one_image(&request, source, times)?;
+    let pipeline = args.method.pipeline(first, args.sampling, args.enhance)?;
+    let folder = ResultFolder::of_file(&args.source.input, &args.out, made(), args.figure.figure);
+    let report = one_image(&pipeline, source, &folder, times)?;
     args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
 }
 
@@ -124,12 +120,11 @@ pub fn picture(
     figure: FigureArgs,
     json: bool,
 ) -> Result<()> {
-    let solver = MethodArgs::default().solver(FirstPatterns::LowestSequencies, Sampling::ALL)?;
-    let made = made();
     let enhance = Enhance::takes(source.measurements.side());
-    let request =
-        OneImage { input: recording, solver: &solver, enhance, out, made, figure: figure.figure };
-    let report = one_image(&request, source, stages())?;
+    let first = FirstPatterns::LowestSequencies;
+    let pipeline = MethodArgs::default().pipeline(first, Sampling::ALL, enhance)?;
+    let folder = ResultFolder::of_file(recording, out, made(), figure.figure);
+    let report = one_image(&pipeline, source, &folder, stages())?;
     report.all_warnings().for_each(print::warning);
     let name = if enhance { "enhanced.png" } else { "image.png" };
     match json {
@@ -138,12 +133,29 @@ pub fn picture(
     }
 }
 
-fn one_image(request: &OneImage<'_>, source: Source, times: StageTimes) -> Result<OneReport> {
-    spinning(|| one(request, source, times)).map_err(|error| match error {
-        OneError::Complex => Usage(error.to_string()).into(),
-        OneError::Solver(error) => error.into(),
+fn one_image(
+    pipeline: &Pipeline,
+    source: Source,
+    folder: &ResultFolder<'_>,
+    times: StageTimes,
+) -> Result<OneReport> {
+    spinning(|| pipeline.one(source, folder, times)).map_err(failure)
+}
+
+/// Why there is no image, in the words of the command line.
+fn failure(error: PipelineError) -> anyhow::Error {
+    match error {
+        PipelineError::Complex => {
+            Usage("--enhance needs real images: choose --part real or --part imaginary".to_owned())
+                .into()
+        }
+        PipelineError::Source(error) => usage_or_failure(error),
+        // The command line handles these errors by their own types.
+        PipelineError::File(error) => error.into(),
+        PipelineError::Solver(error) => error.into(),
+        PipelineError::Networks(error) => anyhow::Error::from(error).context("--enhance"),
         error => error.into(),
-    })
+    }
 }
 
 /// Shows that the program works, because OMP takes seconds for thousands of patterns.

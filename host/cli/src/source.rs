@@ -139,11 +139,6 @@ impl SourceArgs {
         Source::halves(&self.input, &self.options()?).map_err(usage_or_failure)
     }
 
-    /// Reads all measurements of a file or recording.
-    pub fn load_all(&self) -> Result<Vec<Source>> {
-        Source::read_all(&self.input, &self.options()?).map_err(usage_or_failure)
-    }
-
     /// The requested index.
     pub fn one(&self) -> Result<Option<usize>> {
         self.options()?.one().map_err(usage_or_failure)
@@ -151,7 +146,7 @@ impl SourceArgs {
 }
 
 /// Conflicting options count as wrong usage; every other error counts as a failure.
-fn usage_or_failure(error: SourceError) -> anyhow::Error {
+pub fn usage_or_failure(error: SourceError) -> anyhow::Error {
     match error {
         error if error.is_of_options() => Usage(error.to_string()).into(),
         // The command line handles these errors by their own types.

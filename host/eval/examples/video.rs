@@ -8,7 +8,7 @@
 //! `image.png` (a moving letter: scene and best single frames above, recursive estimates below).
 
 use nirspi::picture::{
-    Axis, Chart, Figure, FigureStyle, Line, Panel, Pictures, Range, SideBySide, Unit,
+    Axis, Chart, Figure, FigureStyle, Line, Panel, Pictures, Range, Sheet, SideBySide, Unit,
 };
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::video::{Compared, Motion, VideoRow, compare};
@@ -128,15 +128,11 @@ fn animate(out: &Path, made: &Compared) -> Result<()> {
         Image::new(Side::new(64).unwrap_or(Side::INSTRUMENT), (0..4 * n * n).map(pixel).collect())
     };
     let images: Vec<Image> = (0..made.truths.len()).map(frame).collect();
-    let header = format!("{}: scene, frame by frame; recursive, in turn", made.rows[0].motion);
-    let pictures = Pictures::of_video(
-        &header,
-        &images,
-        Unit::Reflectance,
-        None,
-        FigureStyle::Paper,
-        &provenance(),
-    );
+    let (motion, frames) = (&made.rows[0].motion, images.len());
+    let header = format!("{motion}: scene, frame by frame; recursive, in turn, {frames} frames");
+    let values = images.iter().map(Image::pixels).collect();
+    let sheet = Sheet::new(header, (64, 64), values, Unit::Reflectance);
+    let pictures = Pictures::of_stack(&sheet, None, FigureStyle::Paper, &provenance());
     let mut folder = nirspi::files::output::OutputDir::create(out)?;
     pictures.write(&mut folder)?;
     folder.commit()?;

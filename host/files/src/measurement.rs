@@ -63,6 +63,7 @@ pub use plain::{read_plain, read_plain_all};
 use rayon::prelude::*;
 pub use remedy::Remedy;
 pub use stack::Stack;
+use std::ops::Range;
 use std::path::Path;
 pub use sweeps::{Sweeps, most_together};
 pub use weighed::Plain;
@@ -226,23 +227,28 @@ impl Several {
         self.0.side
     }
 
-    /// Reads and checks every measurement, on all threads, and makes something of each.
+    /// Reads and checks these measurements, on all threads, and makes something of each, or says why not.
     ///
     /// # Errors
-    /// As [`read`], of the first measurement that is refused; or the error of `make`.
-    pub fn each<T: Send, E: From<FileError> + Send>(
+    /// [`FileError`] if the file cannot be read.
+    pub fn some<T: Send, E: From<FileError> + Send>(
         &mut self,
+        which: Range<usize>,
         make: impl Fn(MeasurementFile) -> Result<T, E> + Sync,
-    ) -> Result<Vec<T>, E> {
-        let count = self.len();
+    ) -> Result<Vec<Result<T, E>>, FileError> {
         let file = self.0.loaded()?;
         let one = |index| make(file.measurement(index)?);
-        let made: Vec<Result<T, E>> = (0..count).into_par_iter().map(one).collect();
-        made.into_iter().collect()
+        Ok(which.into_par_iter().map(one).collect())
+    }
+
+    /// Every measurement, as it is read.
+    #[cfg(test)]
+    fn each(&mut self) -> Result<Vec<MeasurementFile>, FileError> {
+        self.some(0..self.len(), Ok)?.into_iter().collect()
     }
 
     /// All measurements as one block of numbers, if they are real differences of the same patterns
-    /// and lie one after another; `None` for any other file, which [`each`](Self::each) reads.
+    /// and lie one after another; `None` for any other file, which [`some`](Self::some) reads.
     ///
     /// # Errors
     /// As [`read`].

@@ -19,12 +19,14 @@
 //! (`tests::a_folder_keeps_no_file_open_however_many_it_takes`).
 
 mod earlier;
+mod growing;
 #[cfg(not(target_family = "wasm"))]
 mod spool;
 
 use super::FileError;
 use super::interrupt::Noted;
-use earlier::Earlier;
+use earlier::{Content, Earlier};
+pub use growing::Growing;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use spool::Spool;
 use std::fs;
@@ -101,9 +103,60 @@ impl OutputDir {
         let ((), staged) = stage(&target, |file| {
             file.write_all(bytes).map_err(|error| FileError::io(&target, "write", error))
         })?;
-        self.earlier.written(name, bytes);
-        self.staged.push((staged, name.to_owned()));
+        self.keep(name, Content::of(bytes), staged);
         Ok(())
+    }
+
+    /// Stages a file named `name` that is written piece by piece.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_in_pieces(
+        &mut self,
+        name: &str,
+        write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), FileError> {
+        let mut growing = self.grow(name, 0)?;
+        write(&mut growing)
+            .map_err(|error| FileError::io(&self.path.join(name), "write", error))?;
+        self.take(growing, &[])
+    }
+
+    /// Begins a file named `name`, whose first `beginning` bytes are not known yet.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn grow(&self, name: &str, beginning: usize) -> Result<Growing, FileError> {
+        self.check([name])?;
+        Growing::new(&self.path.join(name), name, beginning)
+    }
+
+    /// Stages a file that has grown, with its beginning.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    ///
+    /// # Panics
+    /// If the beginning has another length than was said.
+    pub fn take(&mut self, grown: Growing, beginning: &[u8]) -> Result<(), FileError> {
+        let (name, content, staged) = grown.finish(&self.path, beginning)?;
+        self.keep(&name, content, staged);
+        Ok(())
+    }
+
+    /// An empty file without a name, on the disk of the folder, for what does not fit into memory. It is gone when it
+    /// is closed.
+    ///
+    /// # Errors
+    /// [`FileError`] names the folder and the system's reason.
+    pub fn scratch(&self) -> Result<fs::File, FileError> {
+        tempfile::tempfile_in(&self.path)
+            .map_err(|error| FileError::io(&self.path, "write to", error))
+    }
+
+    fn keep(&mut self, name: &str, content: Content, staged: Staged) {
+        self.earlier.written(name, content);
+        self.staged.push((staged, name.to_owned()));
     }
 
     /// Renames every staged file into place, removes the other files of the run that these results

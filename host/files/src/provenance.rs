@@ -12,6 +12,7 @@ use crate::identity::CameraIdentity;
 use crate::{boards, clock};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::io::{self, Write};
 use std::path::Path;
 
 /// The key of the JSON text: a PNG's text chunk and an MCAP file's metadata record.
@@ -242,14 +243,28 @@ impl Provenance {
     /// # Errors
     /// [`serde_json::Error`] if the report is no structure or map.
     pub fn sign(&self, report: &(impl Serialize + ?Sized)) -> serde_json::Result<String> {
+        let mut text = Vec::new();
+        self.sign_into(report, &mut text).map_err(serde_json::Error::io)?;
+        Ok(String::from_utf8_lossy(&text).into_owned())
+    }
+
+    /// As [`sign`](Self::sign), for a report that is longer than the memory.
+    ///
+    /// # Errors
+    /// As [`sign`](Self::sign), and those of `to`.
+    pub fn sign_into(
+        &self,
+        report: &(impl Serialize + ?Sized),
+        mut to: impl Write,
+    ) -> io::Result<()> {
         #[derive(Serialize)]
         struct Signed<'s, R: ?Sized> {
             #[serde(flatten)]
             report: &'s R,
             provenance: &'s Provenance,
         }
-        let text = serde_json::to_string_pretty(&Signed { report, provenance: self })?;
-        Ok(text + "\n")
+        serde_json::to_writer_pretty(&mut to, &Signed { report, provenance: self })?;
+        to.write_all(b"\n")
     }
 }
 

@@ -128,8 +128,12 @@ fn undo(taps: &[f64], y: &mut [f64], sweep: Sweep) {
         return;
     }
     let leaked = y.to_vec();
+    let earlier = &taps[1..];
     let from_earlier = |x: &[f64], i: usize| -> f64 {
-        let history = taps[1..].iter().enumerate();
+        if let Some(first) = i.checked_sub(earlier.len()) {
+            return earlier.iter().zip(x[first..i].iter().rev()).map(|(tap, x)| tap * x).sum();
+        }
+        let history = earlier.iter().enumerate();
         history
             .map(|(j, tap)| {
                 let sweeps_ago = (count + j - i) / count;

@@ -60,7 +60,7 @@ pub use own_matrix::{
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};
-pub use stack::{stack, stack_while};
+pub use stack::{AT_A_TIME, stack, stack_while};
 pub use stacked::Stacked;
 pub use video::{VideoFrame, omp_video};
 pub use weight::WITHIN;

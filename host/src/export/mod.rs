@@ -25,7 +25,6 @@ use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;
 use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::words::count;
-use nirspi_wire::Frame;
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -177,9 +176,6 @@ pub enum ExportError {
     /// The file cannot be written, or the image of the scene cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The recording changed between two readings.
-    #[error("{}: the recording changed while it was read: export it when its capture has ended", .0.display())]
-    Changed(PathBuf),
     /// The networks cannot be used.
     #[cfg(feature = "enhance")]
     #[error(transparent)]
@@ -316,11 +312,11 @@ impl Whole {
         let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
         let mut index = 0;
         hear_recording(&mut recording, |heard, _| {
-            let Some(frame) = heard.frame() else { return Ok(()) };
+            let Some(frame) = heard.frame() else { return Ok::<(), ExportError>(()) };
             if index == self.frames() || setup != self.setup {
-                return Err(ExportError::Changed(self.path.clone()));
+                return Err(SourceError::Changed(self.path.clone()).into());
             }
-            let measurements = alone(frame, &setup)
+            let measurements = Integrated::of_frame(&setup, frame)
                 .of_run(&self.known)
                 .measurements(&setup, settling.as_ref(), self.keep_leak)
                 .map_err(|problem| self.integrate(problem))?;
@@ -328,18 +324,16 @@ impl Whole {
             index += 1;
             Ok(())
         })?;
-        if index == self.frames() { Ok(()) } else { Err(ExportError::Changed(self.path.clone())) }
+        if index == self.frames() {
+            Ok(())
+        } else {
+            Err(SourceError::Changed(self.path.clone()).into())
+        }
     }
 
     fn integrate(&self, problem: IntegrateError) -> ExportError {
         SourceError::Integrate { path: self.path.clone(), problem }.into()
     }
-}
-
-fn alone(frame: &Frame<'_>, setup: &MeasurementSetup) -> Integrated {
-    let mut alone = Integrated::new(setup);
-    alone.add(frame);
-    alone
 }
 
 /// The settings of the default method, with the shipped network where networks are built in, as those

@@ -38,7 +38,13 @@ impl White {
     /// images.
     #[must_use]
     pub fn median_level<'i>(self, images: impl IntoIterator<Item = &'i Image>) -> f32 {
-        let mut levels: Vec<f32> = images.into_iter().map(|image| self.level(image)).collect();
+        Self::median(images.into_iter().map(|image| self.level(image)))
+    }
+
+    /// The median of white levels of several images; 0 without images.
+    #[must_use]
+    pub fn median(levels: impl IntoIterator<Item = f32>) -> f32 {
+        let mut levels: Vec<f32> = levels.into_iter().collect();
         levels.sort_by(f32::total_cmp);
         levels.get(levels.len() / 2).copied().unwrap_or(0.0)
     }

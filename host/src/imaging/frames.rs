@@ -119,13 +119,31 @@ pub fn enhance_frames_by(
             |a: &(&Image, &Rows), b: &(&Image, &Rows)| a.1 == b.1 && a.0.side() == b.0.side();
         for alike in frames.chunk_by(like).flat_map(|alike| alike.chunks(AT_A_TIME)) {
             let images: Vec<&Image> = alike.iter().map(|(image, _)| *image).collect();
-            let context = ImageContext { rows: Some(alike[0].1), ..ImageContext::default() };
-            for mut made in enhance.enhance_all(&images, white, &context)? {
-                reports.push(FrameReport::of(&made, &warnings(&made)));
-                pixels.append(&mut made.pixels);
+            for (mut made, report) in enhance_alike(enhance, &images, alike[0].1, white)? {
+                reports.push(report);
+                pixels.append(&mut made);
             }
         }
         Ok(())
     })?;
     Ok((pixels, reports))
+}
+
+/// Enhances images of one size, made of the same rows, of one white level. Of each: 64 x 64 pixels in [0, 1], and the report.
+///
+/// # Errors
+/// As [`Enhance::enhance_all`].
+pub fn enhance_alike(
+    enhance: &Enhance,
+    images: &[&Image],
+    rows: &Rows,
+    white: f32,
+) -> Result<Vec<(Vec<f32>, FrameReport)>, FramesError> {
+    let context = ImageContext { rows: Some(rows), ..ImageContext::default() };
+    let made = enhance.enhance_all(images, white, &context)?;
+    let told = |made: EnhancedImage| {
+        let report = FrameReport::of(&made, &warnings(&made));
+        (made.pixels, report)
+    };
+    Ok(made.into_iter().map(told).collect())
 }

@@ -26,7 +26,9 @@ mod white;
 #[cfg(feature = "enhance")]
 pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COPIES, White};
 #[cfg(feature = "enhance")]
-pub use frames::{FrameReport, FramesError, enhance_frame, enhance_frames, enhance_frames_by};
+pub use frames::{
+    FrameReport, FramesError, enhance_alike, enhance_frame, enhance_frames, enhance_frames_by,
+};
 pub use method_report::MethodReport;
 pub use quality::{Fit, Noise, Quality, score};
 #[cfg(feature = "enhance")]

@@ -43,7 +43,7 @@ pub use layout::{Panel, SideBySide};
 pub use look::{FigureStyle, Look};
 pub use report::Pictures;
 pub use scale::{PERCENTILES, Range, Scale, Unit};
-pub use sheet::Sheet;
+pub use sheet::{Sheet, chosen};
 pub use terminal::{Tones, half_blocks};
 #[cfg(not(target_family = "wasm"))]
 pub use trace::of_trace;

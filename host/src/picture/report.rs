@@ -133,32 +133,21 @@ impl Pictures {
         pictures
     }
 
-    /// The pictures of a video: a contact sheet and a video of the images, and of the enhanced ones
-    /// in `[0, 1]`, if there are any. `warned` says which enhanced images have warnings.
+    /// The pictures of a stack: a contact sheet and a video of the images, and of the enhanced ones
+    /// in `[0, 1]`, if there are any.
     ///
     /// # Panics
-    /// If there is no image, or images differ in size.
+    /// If there is no image.
     #[must_use]
-    pub fn of_video(
-        header: &str,
-        images: &[Image<impl Shape>],
-        unit: Unit,
-        enhanced: Option<(&[f32], Vec<usize>)>,
+    pub fn of_stack(
+        images: &Sheet<'_>,
+        enhanced: Option<&Sheet<'_>>,
         style: FigureStyle,
         provenance: &Provenance,
     ) -> Self {
         let mut pictures = Self::new(style, provenance);
-        let header = format!("{header}, {} frames", images.len());
-        let size = video::size_of(&images[0]);
-        let values = images.iter().map(Image::pixels).collect();
-        pictures.sheet_and_video("image", &Sheet::new(header.clone(), size, values, unit));
-        if let Some((values, warned)) = enhanced {
-            let area = values.len() / images.len();
-            let (each, side) = (values.chunks_exact(area).collect(), area.isqrt());
-            let header = format!("{header}, enhanced");
-            let sheet = Sheet::new(header, (side, side), each, Unit::OfWhite);
-            pictures.sheet_and_video("enhanced", &sheet.with_warned(warned));
-        }
+        pictures.sheet_and_video("image", images);
+        enhanced.into_iter().for_each(|sheet| pictures.sheet_and_video("enhanced", sheet));
         pictures
     }
 

@@ -12,6 +12,7 @@ use super::scale::{Range, Scale, Unit};
 use super::signature::{MARGIN, signed};
 use super::text::{Block, Style};
 use super::ticks::number;
+use super::video::MOST_BESIDE;
 use crate::files::image::{encode_labelled, to_level};
 use crate::provenance::Provenance;
 use rayon::prelude::*;
@@ -35,7 +36,11 @@ pub struct Sheet<'a> {
     header: String,
     /// Height and width of each image.
     size: (usize, usize),
+    /// Number of images that there are.
+    count: usize,
+    /// Those at hand, and their numbers, which rise.
     images: Vec<&'a [f32]>,
+    numbers: Vec<usize>,
     unit: Unit,
     warned: Vec<usize>,
     scale: CommonOrOwn,
@@ -57,6 +62,22 @@ impl<'a> Sheet<'a> {
     /// If an image has another number of values, or none.
     #[must_use]
     pub fn new(header: String, size: (usize, usize), images: Vec<&'a [f32]>, unit: Unit) -> Self {
+        let numbers = (0..images.len()).collect();
+        Self::of_chosen(header, size, images.len(), (numbers, images), unit)
+    }
+
+    /// A sheet of `count` images, of which those with the numbers [`chosen`] are at hand.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
+    #[must_use]
+    pub fn of_chosen(
+        header: String,
+        size: (usize, usize),
+        count: usize,
+        (numbers, images): (Vec<usize>, Vec<&'a [f32]>),
+        unit: Unit,
+    ) -> Self {
         let (height, width) = size;
         let whole = images.iter().all(|image| image.len() == height * width);
         assert!(height > 0 && width > 0 && whole, "images of {height} x {width}");
@@ -72,7 +93,7 @@ impl<'a> Sheet<'a> {
             true => CommonOrOwn::Own(own),
             false => CommonOrOwn::Common(common),
         };
-        Self { header, size, images, unit, warned: Vec::new(), scale }
+        Self { header, size, count, images, numbers, unit, warned: Vec::new(), scale }
     }
 
     /// The same sheet, with these images marked as not to be trusted.
@@ -85,12 +106,17 @@ impl<'a> Sheet<'a> {
     /// Number of images that there are.
     #[must_use]
     pub fn count(&self) -> usize {
-        self.images.len()
+        self.count
     }
 
     /// The images in the picture.
     pub(super) fn shown(&self) -> Vec<usize> {
-        evenly(self.images.len(), MOST)
+        evenly(self.count, MOST)
+    }
+
+    /// Where an image at hand stands among these.
+    fn place(&self, index: usize) -> usize {
+        self.numbers.binary_search(&index).expect("a chosen image")
     }
 
     /// The common scale, or each image's with its number.
@@ -98,7 +124,7 @@ impl<'a> Sheet<'a> {
         match &self.scale {
             CommonOrOwn::Common(scale) => vec![("all".to_owned(), *scale)],
             CommonOrOwn::Own(own) => {
-                own.iter().enumerate().map(|(k, scale)| (k.to_string(), *scale)).collect()
+                self.numbers.iter().zip(own).map(|(k, scale)| (k.to_string(), *scale)).collect()
             }
         }
     }
@@ -112,13 +138,13 @@ impl<'a> Sheet<'a> {
     }
 
     pub(super) fn image(&self, index: usize) -> &'a [f32] {
-        self.images[index]
+        self.images[self.place(index)]
     }
 
     pub(super) fn scale_of(&self, index: usize) -> Scale {
         match &self.scale {
             CommonOrOwn::Common(scale) => *scale,
-            CommonOrOwn::Own(own) => own[index],
+            CommonOrOwn::Own(own) => own[self.place(index)],
         }
     }
 
@@ -130,7 +156,7 @@ impl<'a> Sheet<'a> {
     #[must_use]
     pub fn png(&self, look: &Look, provenance: &Provenance) -> Vec<u8> {
         let picture = signed(self.draw(look), look, provenance).raster();
-        encode_labelled(&picture, self.images.len(), None, provenance)
+        encode_labelled(&picture, self.count, None, provenance)
     }
 
     /// The sheet as files: endings and bytes of PNG, SVG and PDF.
@@ -155,7 +181,11 @@ impl<'a> Sheet<'a> {
         };
         match &self.scale {
             CommonOrOwn::Common(scale) => {
-                vec![chosen, scale.line(), stretch_words("all images together")]
+                let of = match self.images.len() < count {
+                    true => "the chosen images together",
+                    false => "all images together",
+                };
+                vec![chosen, scale.line(), stretch_words(of)]
             }
             CommonOrOwn::Own(_) => {
                 let unit = self.unit;
@@ -170,8 +200,8 @@ impl<'a> Sheet<'a> {
     fn label(&self, index: usize) -> String {
         match &self.scale {
             CommonOrOwn::Common(_) => index.to_string(),
-            CommonOrOwn::Own(own) => {
-                let Scale { black, white, .. } = own[index];
+            CommonOrOwn::Own(_) => {
+                let Scale { black, white, .. } = self.scale_of(index);
                 format!("{index}: {} to {}", number(black), number(white))
             }
         }
@@ -268,6 +298,15 @@ impl<'a> Sheet<'a> {
     }
 }
 
+/// The numbers of the images of so many that a sheet and a video beside it show.
+#[must_use]
+pub fn chosen(count: usize) -> Vec<usize> {
+    let mut numbers = [evenly(count, MOST), evenly(count, MOST_BESIDE)].concat();
+    numbers.sort_unstable();
+    numbers.dedup();
+    numbers
+}
+
 /// At most `most` of `count` indices, evenly from the first to the last.
 pub(super) fn evenly(count: usize, most: usize) -> Vec<usize> {
     if count <= most {
@@ -325,6 +364,23 @@ mod tests {
         let few = sheet("", &values[..99 * 16], 4);
         assert_eq!(few.lines()[0], "64 of 99 images shown, evenly chosen");
         assert_eq!(sheet("", &values[..64 * 16], 4).lines()[0], "all 64 images");
+    }
+
+    #[test]
+    fn chosen_images_are_shown_under_their_numbers() {
+        let (count, numbers) = (1000, chosen(1000));
+        assert!(numbers.len() < 164 && numbers.contains(&999), "{}", numbers.len());
+        let values: Vec<f32> = numbers.iter().flat_map(|&k| vec![k as f32; 16]).collect();
+        let images = values.chunks_exact(16).collect();
+        let at_hand = (numbers.clone(), images);
+        let sheet = Sheet::of_chosen(String::new(), (4, 4), count, at_hand, Unit::Readings);
+        assert!(numbers.iter().all(|&k| sheet.image(k) == [k as f32; 16]));
+        assert!(
+            sheet.shown().iter().chain(&evenly(count, MOST_BESIDE)).all(|k| numbers.contains(k))
+        );
+        let lines = sheet.lines();
+        assert_eq!(lines[0], "64 of 1000 images shown, evenly chosen");
+        assert!(lines[2].ends_with("of the chosen images together"), "{}", lines[2]);
     }
 
     #[test]

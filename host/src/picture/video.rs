@@ -19,7 +19,7 @@ use rayon::prelude::*;
 /// The most frames of a video that is made for itself.
 const MOST: usize = 1000;
 /// The most frames of a video beside other results, which it must not delay.
-const MOST_BESIDE: usize = 100;
+pub(super) const MOST_BESIDE: usize = 100;
 /// Frames that are drawn at a time, on all processors.
 const TOGETHER: usize = 64;
 /// Frames a second.

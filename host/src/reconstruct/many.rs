@@ -11,6 +11,7 @@ use crate::causes::in_one_line;
 use crate::imaging::MethodReport;
 use crate::provenance::Taken;
 use crate::source::{Index, OutlierReport, Source, SourceError, SourceOptions};
+use nirspi_recon::reconstruct::GoingOn;
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Rows};
 use rayon::prelude::*;
@@ -60,27 +61,11 @@ pub struct Skipped {
 
 /// What many files give.
 #[derive(Debug, Default)]
-pub struct ManyImages {
+pub(super) struct ManyImages {
     /// The images, in the order of the files. All have one side: that of the first.
     pub images: Vec<FileImage>,
     /// The files that give none.
     pub skipped: Vec<Skipped>,
-}
-
-impl ManyImages {
-    /// Where the readings of all images come from, as far as these have it in common: for images of one
-    /// file, all that is known of it. `named` is the folder, or the first of several files.
-    #[must_use]
-    pub fn taken(&self, named: &Path) -> Taken {
-        if let Some(first) = self.images.first()
-            && self.images.iter().all(|image| image.file == first.file)
-        {
-            return first.taken.clone();
-        }
-        let simulated = self.images.first().and_then(|image| image.taken.simulated());
-        let all = self.images.iter().all(|image| image.taken.simulated() == simulated);
-        Taken::of_file(named, simulated.filter(|_| all))
-    }
 }
 
 /// Why a file gives no image.
@@ -99,12 +84,13 @@ enum NoImage {
 
 /// Makes the image of each measurement of these files: all measurements of a measurement file, the sum
 /// of a recording's frames. With [`SourceOptions::index`], that one measurement of each file, or each
-/// frame of each recording. `done` is called after each file, from any thread.
-#[must_use]
-pub fn many_images(
+/// frame of each recording. `side` is that of the images of files before these. `done` is called after each file, from any
+/// thread.
+pub(super) fn many_images(
     files: &[PathBuf],
     options: &SourceOptions,
     solver: &Solver,
+    side: Option<usize>,
     done: &(dyn Fn() + Sync),
 ) -> ManyImages {
     let made: Vec<_> = files
@@ -115,9 +101,9 @@ pub fn many_images(
             made
         })
         .collect();
-    let mut all = ManyImages::default();
+    let (mut all, mut side) = (ManyImages::default(), side);
     for (file, made) in files.iter().zip(made) {
-        match made.and_then(|images| of_one_side(file, images, &all.images)) {
+        match made.and_then(|images| of_one_side(file, images, &mut side)) {
             Ok(images) => all.images.extend(images),
             Err(error) => {
                 let file = file.to_string_lossy().into_owned().into();
@@ -131,13 +117,13 @@ pub fn many_images(
 fn of_one_side(
     file: &Path,
     images: Vec<FileImage>,
-    before: &[FileImage],
+    side: &mut Option<usize>,
 ) -> Result<Vec<FileImage>, NoImage> {
-    let side = |images: &[FileImage]| images.first().map(|found| found.image.side().pixels());
-    match (side(&images), side(before)) {
-        (Some(n), Some(expected)) if n != expected => {
-            Err(NoImage::Side { file: file.to_owned(), n, expected })
-        }
+    let Some(n) = images.first().map(|image| image.image.side().pixels()) else {
+        return Ok(images);
+    };
+    match *side.get_or_insert(n) {
+        expected if n != expected => Err(NoImage::Side { file: file.to_owned(), n, expected }),
         _ => Ok(images),
     }
 }
@@ -159,32 +145,40 @@ fn images_of(
         true => vec![Source::read(file, options)?],
         false => Source::read_all(file, options)?,
     };
-    Ok(file_images(file, sources, solver, false)?)
+    let all = Part { from: 0, several: sources.len() > 1 };
+    Ok(file_images(file, &sources, solver, all, false, &|| Ok(()))?)
 }
 
-/// The images of all measurements of one file, in their order. In a video, each frame starts from the
-/// frames before.
-///
-/// # Errors
-/// [`SolverError`] names the file and the problem.
-pub fn file_images(
+/// Which of the measurements of a file these are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part {
+    /// Number of the first one.
+    pub from: usize,
+    /// Whether the file has several.
+    pub several: bool,
+}
+
+/// The images of measurements of one file, in their order. In a video, each frame starts from the
+/// frames before. `going_on` is called before the image of each.
+pub(super) fn file_images(
     file: &Path,
-    sources: Vec<Source>,
+    sources: &[Source],
     solver: &Solver,
+    part: Part,
     is_video: bool,
+    going_on: GoingOn<'_>,
 ) -> Result<Vec<FileImage>, SolverError> {
-    let several = sources.len() > 1;
-    let made = solver.solve_all(file, &sources, is_video)?;
-    let image = |(index, (source, solved)): (usize, (Source, Solved))| {
+    let made = solver.solve_all(file, sources, is_video, going_on)?;
+    let image = |(index, (source, solved)): (usize, (&Source, Solved))| {
         let Solved { image, with_readings, parts, used, order, report } = solved;
         // The frames of one recording lack the same, and are judged together.
         let warnings = match index {
-            0 => all_warnings(&source, &report),
+            0 => all_warnings(source, &report),
             _ => source.warnings.clone(),
         };
         FileImage {
             file: file.to_owned(),
-            index: several.then_some(index),
+            index: part.several.then_some(index),
             image,
             with_readings,
             used: used.rows().clone(),
@@ -193,12 +187,13 @@ pub fn file_images(
             recorded: source.frames.is_some(),
             report,
             outliers: source.outliers.iter().map(OutlierReport::of).collect(),
-            notes: losses(&source).chain(source.notes.iter().cloned()).collect(),
+            notes: losses(source).chain(source.notes.iter().cloned()).collect(),
             warnings,
-            taken: source.taken,
+            taken: source.taken.clone(),
         }
     };
-    Ok(sources.into_iter().zip(made).enumerate().map(image).collect())
+    let all = sources.iter().zip(made).enumerate();
+    Ok(all.map(|(at, both)| image((part.from + at, both))).collect())
 }
 
 /// What a user must know of an image: of its readings, and whether they belong to their patterns.
@@ -261,7 +256,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..40).map(|k| measured(folder.path(), k, 8)).collect();
         let (options, solver, done) = (SourceOptions::default(), solver(), AtomicUsize::new(0));
-        let made = many_images(&files, &options, &solver, &|| {
+        let made = many_images(&files, &options, &solver, None, &|| {
             done.fetch_add(1, Ordering::Relaxed);
         });
         assert_eq!((made.skipped, done.into_inner()), (Vec::new(), 40));
@@ -282,7 +277,7 @@ mod tests {
         let other_side = measured(folder.path(), 3, 4);
         let gone = folder.path().join("gone.csv");
         let files = [first.clone(), gone.clone(), other_side.clone(), last.clone()];
-        let made = many_images(&files, &SourceOptions::default(), &solver(), &|| {});
+        let made = many_images(&files, &SourceOptions::default(), &solver(), None, &|| {});
         let with: Vec<&PathBuf> = made.images.iter().map(|image| &image.file).collect();
         let without: Vec<&PathBuf> = made.skipped.iter().map(|skipped| &skipped.file).collect();
         assert_eq!((with, without), (vec![&first, &last], vec![&gone, &other_side]));
@@ -301,8 +296,9 @@ mod tests {
             (0..256).for_each(|row| writeln!(text, "16,{row},{}", value(row)).unwrap());
             std::fs::write(&path, text).unwrap();
             let read = || Source::read(&path, &SourceOptions::default()).unwrap();
-            let sources = (0..10).map(|_| read()).collect();
-            let images = file_images(&path, sources, &solver, false).unwrap();
+            let sources: Vec<Source> = (0..10).map(|_| read()).collect();
+            let all = Part { from: 0, several: true };
+            let images = file_images(&path, &sources, &solver, all, false, &|| Ok(())).unwrap();
             let is_doubt = |warning: &&String| warning.contains("no better than chance");
             images.iter().map(|image| image.warnings.iter().filter(is_doubt).count()).collect()
         };

@@ -1,22 +1,27 @@
-//! Makes images of measurements as they were read: one image for a folder of results, or any
-//! number of images by one prepared method.
+//! From measurements as they were read to images, pictures and reports in a folder: [`Pipeline`] for one measurement, all
+//! measurements of a file or recording, or many files; [`own_image`] for patterns of a user's own.
 
+mod frame_reports;
 mod many;
-#[cfg(all(feature = "enhance", feature = "pictures"))]
 mod one;
-#[cfg(all(feature = "enhance", feature = "pictures"))]
 mod own;
+mod pipeline;
+mod pipeline_error;
+mod said;
 mod solver;
-#[cfg(all(feature = "enhance", feature = "pictures"))]
 mod stack;
 
-pub use many::{FileImage, ManyImages, Skipped, file_images, many_images};
-#[cfg(all(feature = "enhance", feature = "pictures"))]
-pub use one::{DropoutReport, OneError, OneImage, OneReport, one_image, write_image};
-#[cfg(all(feature = "enhance", feature = "pictures"))]
+pub use frame_reports::FrameReports;
+pub use many::Skipped;
+pub use one::{DropoutReport, LampReport, OneReport};
 pub use own::{OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, own_image};
+pub use pipeline::{Pipeline, ResultFolder};
+pub use pipeline_error::PipelineError;
+pub use said::{AllSaid, Kind, Said};
 pub use solver::{
     Recipe, Solved, Solver, SolverError, check_finite, not_read_words, own_atoms, read_atoms,
 };
-#[cfg(all(feature = "enhance", feature = "pictures"))]
-pub use stack::{ImageReport, StackFolder, StackFolderError, StackReport, write_stack};
+pub use stack::{StackReport, Step, Watch};
+
+use many::FileImage;
+use one::write_image;

@@ -1,13 +1,12 @@
 //! One image, its pictures and its report, in a folder.
 
 use super::many::all_warnings;
-use super::{Solved, Solver, SolverError, not_read_words};
+use super::{PipelineError, ResultFolder, Solved, Solver, not_read_words};
 use crate::account::LossCounters;
 use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
-use crate::imaging::{FrameReport, FramesError, MethodReport, enhance_frames};
-use crate::picture::{FigureStyle, Pictures, Unit};
-use crate::provenance::Made;
+use crate::imaging::{Enhance, FrameReport, MethodReport, enhance_frames_by};
+use crate::picture::{Pictures, Unit};
 use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
 use nirspi_recon::law::{Lamp, Witness};
@@ -16,23 +15,6 @@ use nirspi_recon::{Image, Shape, metrics};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// The reconstruction of one measurement.
-pub struct OneImage<'r> {
-    /// The file or recording of the measurement, for messages and the report.
-    pub input: &'r Path,
-    /// The method.
-    pub solver: &'r Solver,
-    /// Whether networks also enlarge and deblur the image.
-    pub enhance: bool,
-    /// Folder for the results.
-    pub out: &'r Path,
-    /// The program, for the provenance of the results.
-    pub made: &'r Made,
-    /// What the pictures are made for.
-    pub figure: FigureStyle,
-}
 
 /// Readings that were lost.
 #[derive(Debug, Serialize)]
@@ -170,47 +152,30 @@ impl OneReport {
     }
 }
 
-/// Why there is no image.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum OneError {
-    /// The measurement gives no image.
-    #[error(transparent)]
-    Solver(#[from] SolverError),
-    /// Networks take real images only.
-    #[error("--enhance needs a real image: choose --part real or --part imaginary")]
-    Complex,
-    /// The networks failed.
-    #[error("--enhance")]
-    Enhance(#[from] FramesError),
-    /// A result cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
-}
-
 /// Reconstructs one image and writes it with its pictures and its report.
-///
-/// # Errors
-/// [`OneError`] names the file and the problem. Nothing is left behind.
-pub fn one_image(
-    request: &OneImage<'_>,
+pub(super) fn one_image(
+    solver: &Solver,
+    networks: Option<&Enhance>,
     source: Source,
+    folder: &ResultFolder<'_>,
     mut times: StageTimes,
-) -> Result<OneReport, OneError> {
-    if request.enhance && source.imaginary.is_some() {
-        return Err(OneError::Complex);
+) -> Result<OneReport, PipelineError> {
+    if networks.is_some() && source.imaginary.is_some() {
+        return Err(PipelineError::Complex);
     }
-    let solved = times.time("reconstruct", || request.solver.solve(request.input, &source))?;
+    let solved = times.time("reconstruct", || solver.solve(folder.input, &source))?;
     let Solved { image, with_readings, parts, used, order, report: method } = solved;
     let side = image.side().pixels();
     let correlation = source.reference.as_ref().and_then(|reference| {
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()
     });
-    let (sharp, enhancement) = if request.enhance {
-        let (sharp, mut reports) = enhance_frames(&[(&with_readings, used.rows())], &mut times)?;
-        (Some(sharp), reports.pop())
-    } else {
-        (None, None)
+    let (sharp, enhancement) = match networks {
+        Some(networks) => {
+            let given = [(&with_readings, used.rows())];
+            let (sharp, mut reports) = enhance_frames_by(networks, &given, &mut times)?;
+            (Some(sharp), reports.pop())
+        }
+        None => (None, None),
     };
     let warnings = all_warnings(&source, &method);
     let unit = Unit::of_readings(source.frames.is_some());
@@ -220,16 +185,12 @@ pub fn one_image(
         readings: d.length,
         rows: d.rows,
     });
-    let provenance = source.taken.made(request.made);
+    let provenance = source.taken.made(folder.made);
+    let (enhanced, figure) = (sharp.as_deref().zip(short), folder.figure);
+    let draw = || Pictures::of_image(&image, unit, enhanced, figure, &provenance);
     let report = OneReport {
-        pictures: Pictures::of_image(
-            &image,
-            unit,
-            sharp.as_deref().zip(short),
-            request.figure,
-            &provenance,
-        ),
-        input: request.input.to_owned(),
+        pictures: times.time("pictures", draw),
+        input: folder.input.to_owned(),
         n: side,
         measurements: source.measurements.rows().len(),
         used: used.rows().len(),
@@ -248,7 +209,7 @@ pub fn one_image(
         notes: source.notes,
         stage_ms: times,
     };
-    write_image(request.out, &image, parts.as_ref(), sharp.as_deref(), &report.pictures, &report)?;
+    write_image(folder.out, &image, parts.as_ref(), sharp.as_deref(), &report.pictures, &report)?;
     Ok(report)
 }
 
@@ -257,7 +218,7 @@ pub fn one_image(
 ///
 /// # Errors
 /// [`FileError`] names the file. Nothing is left behind.
-pub fn write_image(
+pub(super) fn write_image(
     out: &Path,
     image: &Image<impl Shape>,
     parts: Option<&[Image; 2]>,

@@ -5,7 +5,7 @@ use super::{SolverError, check_finite, not_read_words, read_atoms, write_image};
 use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain, read_plain_all};
 use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
-use crate::picture::{FigureStyle, Pictures, Unit};
+use crate::picture::{FigureStyle, Pictures, Sheet, Unit};
 use crate::provenance::{self, Taken};
 use crate::stage_times::StageTimes;
 use nirspi_recon::reconstruct::{
@@ -169,8 +169,12 @@ pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnRepo
         write_image(request.out, &image, None, None, &report.pictures, &report)?;
         return Ok(report);
     }
-    let named = input.display().to_string();
-    let draw = || Pictures::of_video(&named, &images, Unit::Readings, None, *figure, &provenance);
+    let header = format!("{}, {} frames", input.display(), images.len());
+    let draw = || {
+        let values = images.iter().map(Image::pixels).collect();
+        let sheet = Sheet::new(header, (of.height, of.width), values, Unit::Readings);
+        Pictures::of_stack(&sheet, None, *figure, &provenance)
+    };
     let pictures = times.time("pictures", draw);
     let mut out = OutputDir::create(request.out)?;
     times.time("write", || -> Result<(), FileError> {

@@ -4,7 +4,8 @@ use crate::files::{FileError, npy};
 use crate::imaging::MethodReport;
 use crate::source::{FirstPatterns, Source};
 use nirspi_recon::reconstruct::{
-    Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction, stack,
+    GoingOn, Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction,
+    stack_while,
 };
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, MeasurementError, Measurements, Rows, Sampling, Shape, ShorterSweep};
@@ -128,19 +129,20 @@ impl Solver {
         Ok(ready)
     }
 
-    /// The images of measurements of one side: of [one kind](stack), or a video in which each frame starts
+    /// The images of measurements of one side: of [one kind](nirspi_recon::reconstruct::stack), or a video in which each frame starts
     /// from the frames before.
     fn images(
         &self,
         measurements: &[Measurements],
         is_video: bool,
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, SolverError> {
         let Some(first) = measurements.first() else { return Ok(Vec::new()) };
         let method = self.prepared(first.side().pixels())?;
         let made = match (is_video, measurements) {
             (true, _) => method.reconstruct_video(measurements),
             (false, [one]) => method.reconstruct(one).map(|made| vec![made]),
-            (false, _) => stack(&*method, measurements),
+            (false, _) => stack_while(&*method, measurements, going_on),
         };
         match &self.recipe.dictionary {
             Some(path) => {
@@ -155,20 +157,21 @@ impl Solver {
     /// # Errors
     /// [`SolverError`] names the file and the problem.
     pub fn solve(&self, path: &Path, source: &Source) -> Result<Solved, SolverError> {
-        Ok(self.solve_all(path, std::slice::from_ref(source), false)?.remove(0))
+        Ok(self.solve_all(path, std::slice::from_ref(source), false, &|| Ok(()))?.remove(0))
     }
 
     /// The images of all measurements that were read from `path`, in their order. What is the same for
-    /// measurements of [one kind](stack) is found out once. In a video, each frame starts from the
-    /// frames before.
+    /// measurements of [one kind](nirspi_recon::reconstruct::stack) is found out once. In a video, each frame starts from the
+    /// frames before. `going_on` is called before the image of each, from any thread.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// As [`solve`](Self::solve); and the error of `going_on`.
     pub fn solve_all(
         &self,
         path: &Path,
         sources: &[Source],
         is_video: bool,
+        going_on: GoingOn<'_>,
     ) -> Result<Vec<Solved>, SolverError> {
         let Recipe { method, first, sampling, .. } = &self.recipe;
         let wrong = |problem| SolverError::Measurements { path: path.to_owned(), problem };
@@ -191,9 +194,9 @@ impl Solver {
         let imaginary = sources.iter().filter_map(|source| source.imaginary.as_ref());
         let imaginary: Vec<Measurements> =
             imaginary.map(|part| Ok(take(part)?.0)).collect::<Result<_, SolverError>>()?;
-        let others = self.images(&imaginary, is_video)?.into_iter().map(Some);
+        let others = self.images(&imaginary, is_video, going_on)?.into_iter().map(Some);
         let others = others.chain(std::iter::repeat_with(|| None));
-        let made = self.images(&used, is_video)?;
+        let made = self.images(&used, is_video, going_on)?;
         let all: Vec<_> = made.into_iter().zip(others).zip(used).zip(orders).zip(sources).collect();
         let solved = |((((made, other), used), order), source): (_, &Source)| {
             let (made, other): (Reconstruction, Option<Reconstruction>) = (made, other);

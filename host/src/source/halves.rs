@@ -1,6 +1,6 @@
 //! A recording in two halves, so that a picture of one can be judged by readings of the other.
 
-use super::recording::{frames_of_recording, from_recording};
+use super::recording::from_recording;
 use super::{Source, SourceError, SourceOptions};
 use nirspi_recon::Measurements;
 use std::path::Path;
@@ -20,7 +20,7 @@ impl Source {
             return Ok(None);
         }
         let noise = from_recording(path, options)?.measurements.noise();
-        let frames = frames_of_recording(path, options)?;
+        let frames = Self::read_all(path, options)?;
         let half = |first: usize| -> Option<Result<Measurements, SourceError>> {
             let mut frames = frames.iter().skip(first).step_by(2).map(|frame| &frame.measurements);
             let rows = frames.clone().next()?.rows();

@@ -4,13 +4,16 @@ use super::several::fits_together;
 use super::{NOT_CALIBRATED, Source, SourceError, SourceOptions, not_whole};
 use crate::calibration::KeptFlatField;
 use crate::causes;
+use crate::files::FileError;
 use crate::integrate::Integrated;
 use crate::moving::followed;
 use crate::provenance::Taken;
-use crate::recording::{self, End, Recording, tally_recording};
+use crate::recording::{End, Recording, RecordingError, hear_recording, tally_recording};
 use crate::tally::Tally;
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread;
 
 /// Sums the frames of a recording, and makes their account again.
 pub(super) fn from_recording(path: &Path, options: &SourceOptions) -> Result<Source, SourceError> {
@@ -45,20 +48,114 @@ fn no_frame(path: &Path, tally: &Tally) -> SourceError {
     }
 }
 
-pub(super) fn frames_of_recording(
-    path: &Path,
-    options: &SourceOptions,
-) -> Result<Vec<Source>, SourceError> {
-    let mut recording = Recording::open(path)?;
-    let (rows, area) = (recording.setup.rows.len(), recording.setup.rows.side());
-    let fits = |count| fits_together(path, count, rows, area);
-    let (frames, tally) = recording::frames_of_recording(&mut recording, fits)?;
-    if frames.is_empty() {
-        return Err(no_frame(path, &tally));
+/// The frames of a recording, after a first reading that counted them.
+pub struct Frames<'a> {
+    path: &'a Path,
+    options: &'a SourceOptions,
+    /// As the first reading has left it.
+    recording: Recording,
+    tally: Tally,
+    count: usize,
+    flat_field: FlatFieldRead,
+}
+
+impl<'a> Frames<'a> {
+    /// Reads the recording once: what its frames tell of each other, and how many there are.
+    pub(super) fn open(path: &'a Path, options: &'a SourceOptions) -> Result<Self, SourceError> {
+        let mut recording = Recording::open(path)?;
+        let mut count = 0;
+        let tally = hear_recording(&mut recording, |heard, _| {
+            count += usize::from(heard.frame().is_some());
+            Ok::<(), SourceError>(())
+        })?;
+        if count == 0 {
+            return Err(no_frame(path, &tally));
+        }
+        let flat_field = flat_field(options, &recording);
+        Ok(Self { path, options, recording, tally, count, flat_field })
     }
-    let flat_field = flat_field(options, &recording);
-    let source = |frame| of_frames(path, options, &recording, frame, &tally, &flat_field);
-    frames.par_iter().map(source).collect()
+
+    /// Number of frames.
+    pub(super) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Refuses more frames than the memory holds at a time.
+    pub(super) fn fit_together(&self) -> Result<(), SourceError> {
+        let rows = &self.recording.setup.rows;
+        fits_together(self.path, self.count, rows.len(), rows.side())
+    }
+
+    /// Begins to read the frames, `most` at a time, in a thread of its own.
+    pub(super) fn read(&self, most: usize) -> Result<Reading, SourceError> {
+        let mut recording = Recording::open(self.path)?;
+        let (path, setup, count) = (self.path.to_owned(), self.recording.setup.clone(), self.count);
+        if recording.setup != setup {
+            return Err(SourceError::Changed(path));
+        }
+        // One batch is on its way while the one before is worked on.
+        let (to, from) = sync_channel(0);
+        let read = move || {
+            let (mut batch, mut seen) = (Vec::new(), 0);
+            let heard = hear_recording(&mut recording, |heard, _| {
+                let Some(frame) = heard.frame() else { return Ok(()) };
+                batch.push(Integrated::of_frame(&setup, frame));
+                seen += 1;
+                match batch.len() == most {
+                    true => to.send(Ok(std::mem::take(&mut batch))).map_err(|_| Ended::NotWanted),
+                    false => Ok(()),
+                }
+            });
+            let last = match heard {
+                Ok(_) if seen == count => Ok(batch),
+                Ok(_) => Err(SourceError::Changed(path)),
+                Err(Ended::Recording(problem)) => Err(problem.into()),
+                Err(Ended::NotWanted) => return,
+            };
+            // Whoever has gone does not need the last ones.
+            let _ = to.send(last);
+        };
+        thread::Builder::new()
+            .name("frames".to_owned())
+            .spawn(read)
+            .map_err(|error| FileError::io(self.path, "read", error))?;
+        Ok(Reading { from })
+    }
+
+    /// The measurements of frames that were read.
+    pub(super) fn sources(&self, frames: Vec<Integrated>) -> Vec<Result<Source, SourceError>> {
+        let (known, Self { path, options, recording, tally, flat_field, .. }) =
+            (self.tally.known(), self);
+        let source = |frame: Integrated| {
+            let frame = frame.of_run(&known);
+            of_frames(path, options, recording, &frame, tally, flat_field)
+        };
+        frames.into_par_iter().map(source).collect()
+    }
+}
+
+/// Frames that another thread reads.
+pub(super) struct Reading {
+    from: Receiver<Result<Vec<Integrated>, SourceError>>,
+}
+
+impl Reading {
+    /// The next frames; `None` at the end.
+    pub(super) fn next(&self) -> Option<Result<Vec<Integrated>, SourceError>> {
+        self.from.recv().ok()
+    }
+}
+
+/// Why a recording is not read any further.
+enum Ended {
+    Recording(RecordingError),
+    NotWanted,
+}
+
+impl From<RecordingError> for Ended {
+    fn from(problem: RecordingError) -> Self {
+        Self::Recording(problem)
+    }
 }
 
 /// The flat field that is kept for the camera, or why it cannot be read; `None` if none is wanted.

@@ -3,6 +3,7 @@
 use super::{Source, SourceError, SourceOptions, from_file};
 use crate::files::measurement::{self, Stack};
 use nirspi_recon::Side;
+use std::ops::Range;
 use std::path::Path;
 
 /// An open file of measurements, whose measurements fit into memory together.
@@ -39,12 +40,25 @@ impl<'a> Several<'a> {
         Ok(self.file.stack()?)
     }
 
+    /// Number of measurements.
+    pub(super) fn len(&self) -> usize {
+        self.file.len()
+    }
+
     /// All measurements, one by one.
     ///
     /// # Errors
     /// As [`of`](Self::of).
     pub fn each(&mut self) -> Result<Vec<Source>, SourceError> {
-        self.file.each(|file| from_file(self.path, file, self.options.part))
+        self.some(0..self.len())?.into_iter().collect()
+    }
+
+    /// These measurements, or why one of them cannot be used.
+    pub(super) fn some(
+        &mut self,
+        which: Range<usize>,
+    ) -> Result<Vec<Result<Source, SourceError>>, SourceError> {
+        Ok(self.file.some(which, |file| from_file(self.path, file, self.options.part))?)
     }
 }
 

@@ -26,14 +26,19 @@ type Run = BTreeMap<String, Content>;
 
 /// What tells whether a file was changed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-struct Content {
+pub(super) struct Content {
     bytes: u64,
     crc32: u32,
 }
 
 impl Content {
-    fn of(bytes: &[u8]) -> Self {
+    pub(super) fn of(bytes: &[u8]) -> Self {
         Self { bytes: bytes.len() as u64, crc32: crc32fast::hash(bytes) }
+    }
+
+    /// Of a file whose checksum was made while it was written.
+    pub(super) fn new(bytes: u64, crc32: u32) -> Self {
+        Self { bytes, crc32 }
     }
 
     fn of_file(path: &Path) -> io::Result<Self> {
@@ -69,8 +74,8 @@ impl Earlier {
     }
 
     /// Notes a file of the new run.
-    pub(super) fn written(&mut self, name: &str, bytes: &[u8]) {
-        self.new.insert(name.to_owned(), Content::of(bytes));
+    pub(super) fn written(&mut self, name: &str, content: Content) {
+        self.new.insert(name.to_owned(), content);
     }
 
     /// Removes what is left of the runs that the new one replaces, which are those with a file name

@@ -30,6 +30,37 @@ fn files_appear_only_at_commit() {
 }
 
 #[test]
+fn a_file_that_grows_is_read_again_and_gets_its_beginning_last() {
+    let root = tempfile::tempdir().unwrap();
+    // Twice: the second run knows the file of the first by its checksum, and replaces it.
+    for text in [&b"0123456789"[..], b"other"] {
+        let mut dir = OutputDir::create(root.path()).unwrap();
+        let mut grown = dir.grow("image.npy", 3).unwrap();
+        for piece in text.chunks(4) {
+            grown.write_all(piece).unwrap();
+        }
+        let mut read = [0; 3];
+        grown.read_at(2, &mut read).unwrap();
+        assert_eq!(read, text[2..5]);
+        assert!(grown.read_at(text.len() as u64 - 2, &mut read).is_err(), "beyond the end");
+        grown.write_all(b"!").unwrap();
+        dir.take(grown, b"npy").unwrap();
+        dir.write_in_pieces("report.json", |to| to.write_all(b"{}")).unwrap();
+        dir.commit().unwrap();
+        let found = fs::read(root.path().join("image.npy")).unwrap();
+        assert_eq!(found, [b"npy", text, b"!"].concat());
+        assert_eq!(names(root.path()), [".nirspi.json", "image.npy", "report.json"]);
+    }
+    let mut dir = OutputDir::create(root.path()).unwrap();
+    dir.grow("image.npy", 0).unwrap().write_all(b"lost").unwrap();
+    drop(dir.scratch().unwrap());
+    dir.write("other.npy", b"1").unwrap();
+    dir.commit().unwrap();
+    let names = names(root.path());
+    assert_eq!(names, [".nirspi.json", "image.npy", "other.npy", "report.json"]);
+}
+
+#[test]
 fn a_run_that_fails_leaves_nothing_of_its_own() {
     let root = tempfile::tempdir().unwrap();
     let mut dir = OutputDir::create(&root.path().join("a/b/out")).unwrap();

@@ -27,8 +27,9 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// Measurements that are looked at together. More give the images of one stack after another.
-const AT_A_TIME: usize = 4096;
+/// Measurements that are looked at together. More give the images of one stack after another, so a caller may give
+/// so many at a time.
+pub const AT_A_TIME: usize = 4096;
 
 /// The fewest measurements that are a kind.
 const LEAST: usize = 8;

@@ -1,7 +1,6 @@
 //! Reads every packet of a recording, and counts it.
 
 use super::{Recording, RecordingError};
-use nirspi_camera::integrate::Integrated;
 use nirspi_camera::tally::Tally;
 use nirspi_wire::{DeviceMessage, Frame, PacketError, open};
 
@@ -58,28 +57,4 @@ pub fn hear_recording<E: From<RecordingError>>(
 /// [`RecordingError`] if the file cannot be read.
 pub fn tally_recording(recording: &mut Recording) -> Result<Tally, RecordingError> {
     hear_recording(recording, |_, _| Ok(()))
-}
-
-/// The sum of each frame that arrived in order, with what all of them tell of it, and the account of all frames of the recording. `fits`
-/// is asked for each number of frames before they are kept.
-///
-/// # Errors
-/// [`RecordingError`] if the file cannot be read, and errors of `fits`.
-pub fn frames_of_recording<E: From<RecordingError>>(
-    recording: &mut Recording,
-    fits: impl Fn(usize) -> Result<(), E>,
-) -> Result<(Vec<Integrated>, Tally), E> {
-    let setup = recording.setup.clone();
-    let mut frames = Vec::new();
-    let tally = hear_recording(recording, |heard, _| {
-        if let Some(frame) = heard.frame() {
-            fits(frames.len() + 1)?;
-            let mut alone = Integrated::new(&setup);
-            alone.add(frame);
-            frames.push(alone);
-        }
-        Ok::<(), E>(())
-    })?;
-    let known = tally.known();
-    Ok((frames.into_iter().map(|frame| frame.of_run(&known)).collect(), tally))
 }

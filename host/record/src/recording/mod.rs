@@ -37,7 +37,7 @@ mod writer;
 
 pub use book::{Book, Opening};
 pub use file::Target;
-pub use hear::{Heard, frames_of_recording, hear_recording, tally_recording};
+pub use hear::{Heard, hear_recording, tally_recording};
 pub use info::RecordingInfo;
 pub use reader::{End, Packet, Recording, RecordingError};
 pub use recover::{RecoverError, Recovered, recover};

@@ -123,7 +123,7 @@ fn a_pattern_that_was_shown_several_times_has_the_mean_of_its_readings() {
     let (_guard, path) = file("lab.npz", &zip(Zip::Stored, &members));
     let mut several = Several::open(&path, &as_is()).unwrap();
     assert!(several.stack().unwrap().is_none());
-    let all: Vec<_> = several.each(Ok::<_, FileError>).unwrap();
+    let all: Vec<_> = several.each().unwrap();
     assert_eq!(all[1].readings, Readings::Differential(vec![2.0, 1.0, 1.0]));
 }
 

@@ -41,7 +41,7 @@ fn mapped(bytes: &[u8]) -> Result<Option<SumsAndCopy>, FileError> {
 
 fn one_by_one(bytes: &[u8]) -> Result<Vec<MeasurementFile>, FileError> {
     let (_guard, path) = file("lab.npz", bytes);
-    Several::open(&path, &as_is())?.each(Ok)
+    Several::open(&path, &as_is())?.each()
 }
 
 fn differences(found: &MeasurementFile) -> &[f64] {
@@ -168,7 +168,7 @@ fn files_without_a_block_are_read_one_by_one() {
         let (_guard, path) = file("lab.npz", &zip(Zip::Stored, &changed));
         let mut several = Several::open(&path, &want).unwrap();
         assert!(several.stack().unwrap().is_none());
-        assert!(!several.each::<_, FileError>(Ok).unwrap().is_empty());
+        assert!(!several.each().unwrap().is_empty());
     };
     let mut rows = members(d.clone());
     rows[1].1 = npy_i32("(3,)", &[0, -1, 1]);

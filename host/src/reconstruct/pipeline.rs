@@ -1,0 +1,203 @@
+//! From measurements to images and pictures: one measurement, all of a file or recording, many files.
+
+use super::many::{FileImage, Part, file_images, many_images};
+use super::one::{OneReport, one_image};
+use super::pipeline_error::PipelineError;
+use super::stack::{StackReport, Step, Watch, Writing};
+use super::{Solver, SolverError};
+use crate::imaging::Enhance;
+use crate::picture::FigureStyle;
+use crate::provenance::Made;
+use crate::source::{Source, SourceOptions, Sources};
+use crate::stage_times::StageTimes;
+use nirspi_recon::reconstruct::{AT_A_TIME, ReconstructError};
+use nirspi_recon::words::count_of;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Files that are read together, on all processors.
+const FILES_AT_A_TIME: usize = 256;
+
+/// A method, and the networks that also enlarge and deblur its images, if they are wanted.
+pub struct Pipeline {
+    solver: Solver,
+    networks: Option<Enhance>,
+}
+
+/// Where results go, and what is said of them.
+pub struct ResultFolder<'r> {
+    /// The file or folder of the measurements, or the first of several files, for the report.
+    pub input: &'r Path,
+    /// The same in words, above the pictures of a stack.
+    pub named: String,
+    /// Whether there are several files, which the report of a stack then names.
+    pub many: bool,
+    /// Whether each frame of a stack starts from the frames before.
+    pub warm_start: bool,
+    /// The folder.
+    pub out: &'r Path,
+    /// The program, for the provenance of the results.
+    pub made: &'r Made,
+    /// What the pictures are made for.
+    pub figure: FigureStyle,
+}
+
+impl<'r> ResultFolder<'r> {
+    /// Results of one file.
+    #[must_use]
+    pub fn of_file(input: &'r Path, out: &'r Path, made: &'r Made, figure: FigureStyle) -> Self {
+        let named = input.display().to_string();
+        Self { input, named, many: false, warm_start: false, out, made, figure }
+    }
+}
+
+impl Pipeline {
+    /// Images by this method alone.
+    #[must_use]
+    pub fn new(solver: Solver) -> Self {
+        Self { solver, networks: None }
+    }
+
+    /// The same, with networks after it.
+    #[must_use]
+    pub fn with_networks(self, networks: Enhance) -> Self {
+        Self { networks: Some(networks), ..self }
+    }
+
+    /// Makes one image and writes it with its pictures and its report.
+    ///
+    /// # Errors
+    /// [`PipelineError`] names the file and the problem. Nothing is left behind.
+    pub fn one(
+        &self,
+        source: Source,
+        folder: &ResultFolder<'_>,
+        times: StageTimes,
+    ) -> Result<OneReport, PipelineError> {
+        one_image(&self.solver, self.networks.as_ref(), source, folder, times)
+    }
+
+    /// Makes the images of all measurements of a file or recording, in their order, and writes `image.npy`, `enhanced.npy`, the
+    /// pictures and `report.json`. What is the same for measurements of [one kind](nirspi_recon::reconstruct::stack) is found
+    /// out once. With [`ResultFolder::warm_start`], each frame starts from the frames before, and all are in memory together.
+    ///
+    /// Where a measurement cannot be read, the images of those before it are written, and where images cannot be made, those of
+    /// the batches before; [`StackReport::ended`] says why there are no more.
+    ///
+    /// # Errors
+    /// [`PipelineError`] if there is no image at all, or a result cannot be written. Nothing is left behind.
+    pub fn all(
+        &self,
+        mut sources: Sources<'_>,
+        folder: &ResultFolder<'_>,
+        watch: Watch<'_>,
+        mut times: StageTimes,
+    ) -> Result<StackReport, PipelineError> {
+        let most = match folder.warm_start {
+            true => sources.fit_together().map(|()| usize::MAX)?,
+            false => AT_A_TIME,
+        };
+        let several = sources.len() > 1;
+        let (mut writing, mut ended, mut from) = (None, None, 0);
+        let mut batches = sources.batches(most)?;
+        while let Some(batch) = times.time("read", || batches.next()) {
+            let part = Part { from, several };
+            let images = batch.map_err(PipelineError::from).and_then(|batch| {
+                times.time("reconstruct", || self.batch(&batch, part, folder, watch))
+            });
+            match images {
+                Ok(images) => {
+                    from += images.len();
+                    self.add(&mut writing, &images, folder, &mut times)?;
+                }
+                Err(error) => {
+                    ended = Some(error);
+                    break;
+                }
+            }
+        }
+        drop(batches);
+        match writing {
+            Some(writing) => writing.finish(Vec::new(), ended, watch, times),
+            None => Err(ended.unwrap_or_else(|| PipelineError::Empty(folder.input.to_owned()))),
+        }
+    }
+
+    /// Makes the images of many files, and writes them as one stack: of each all measurements, or one or all frames, as
+    /// [`SourceOptions::index`] says. A file that gives no image is among [`StackReport::skipped`].
+    ///
+    /// # Errors
+    /// As [`all`](Self::all).
+    pub fn files(
+        &self,
+        files: &[PathBuf],
+        options: &SourceOptions,
+        folder: &ResultFolder<'_>,
+        watch: Watch<'_>,
+        mut times: StageTimes,
+    ) -> Result<StackReport, PipelineError> {
+        let (mut writing, mut skipped, mut side) = (None, Vec::new(), None);
+        let stop = AtomicBool::new(false);
+        for some in files.chunks(FILES_AT_A_TIME) {
+            let done = || {
+                if !watch(Step::Reconstruct) {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            };
+            let made =
+                times.time("reconstruct", || many_images(some, options, &self.solver, side, &done));
+            side = side.or_else(|| made.images.first().map(|image| image.image.side().pixels()));
+            skipped.extend(made.skipped);
+            self.add(&mut writing, &made.images, folder, &mut times)?;
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+        }
+        let ended = stop.into_inner().then_some(PipelineError::Stopped);
+        match (writing, ended) {
+            (Some(writing), ended) => writing.finish(skipped, ended, watch, times),
+            (None, Some(ended)) => Err(ended),
+            (None, None) => {
+                let reason = skipped.into_iter().next().map(|skipped| skipped.reason);
+                let (files, reason) = (count_of(files.len(), "file"), reason.unwrap_or_default());
+                Err(PipelineError::NoneOf { files, reason })
+            }
+        }
+    }
+
+    /// Writes images to the disk.
+    fn add<'p>(
+        &'p self,
+        writing: &mut Option<Writing<'p>>,
+        images: &[FileImage],
+        folder: &'p ResultFolder<'p>,
+        times: &mut StageTimes,
+    ) -> Result<(), PipelineError> {
+        let Some(first) = images.first() else { return Ok(()) };
+        let writing = match writing {
+            Some(writing) => writing,
+            None => writing.insert(Writing::new(folder, self.networks.as_ref(), first)?),
+        };
+        times.time("write", || writing.add(images))
+    }
+
+    /// The images of some measurements of a file.
+    fn batch(
+        &self,
+        batch: &[Source],
+        part: Part,
+        folder: &ResultFolder<'_>,
+        watch: Watch<'_>,
+    ) -> Result<Vec<FileImage>, PipelineError> {
+        let going_on = || match watch(Step::Reconstruct) {
+            true => Ok(()),
+            false => Err(ReconstructError::Stopped),
+        };
+        let (file, is_video) = (folder.input, folder.warm_start);
+        let made = file_images(file, batch, &self.solver, part, is_video, &going_on);
+        made.map_err(|error| match error {
+            SolverError::Method(ReconstructError::Stopped) => PipelineError::Stopped,
+            error => error.into(),
+        })
+    }
+}
