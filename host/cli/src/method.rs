@@ -4,7 +4,6 @@ use super::Usage;
 use super::report::words;
 use anyhow::Result;
 use clap::{Args, FromArgMatches};
-use nirspi::imaging::Enhance;
 use nirspi::reconstruct::{Pipeline, Recipe, Solver, own_atoms, read_atoms};
 use nirspi::source::FirstPatterns;
 use nirspi_nets::Device;
@@ -137,12 +136,12 @@ impl MethodArgs {
             (self.method, self.settings()?, self.dictionary.clone());
         let solver = Solver::new(Recipe { method, settings, dictionary, first, sampling })?;
         Ok(match enhance {
-            true => Pipeline::new(solver).with_networks(Enhance::built_in(&self.device()?)?),
+            true => Pipeline::new(solver).with_networks(self.backend)?,
             false => Pipeline::new(solver),
         })
     }
 
-    /// The device of the networks: the backend of OMP. `auto` is the processor, as one image at a time is too
+    /// The device of a live page's networks: the backend of OMP. `auto` is the processor, as one image at a time is too
     /// little work for a GPU that was not requested.
     pub fn device(&self) -> Result<Device> {
         let backend = if self.backend == Backend::Auto { Backend::Cpu } else { self.backend };

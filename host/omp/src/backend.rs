@@ -5,6 +5,9 @@
 
 #[cfg(feature = "gpu")]
 pub mod probe;
+mod turns;
+
+pub use turns::{Failure, Turns};
 
 use std::fmt;
 use std::str::FromStr;

@@ -13,7 +13,7 @@
 //! | [`choose`] | whether a batch goes to a GPU or stays on the processor |
 //! | [`DeviceDictionary`] | a matrix, its Gram matrix and norms on a device; solves batches |
 //! | [`DeviceFrames`], [`DeviceSolutions`], [`DeviceImages`] | measurements, sparse representations and images that stay on the device |
-//! | [`solve_batch_over`], [`path_over`] | any other [`Dictionary`](super::Dictionary), its Gram matrix uploaded for one call |
+//! | [`OverDevice`], [`path_over`] | any other [`Dictionary`](super::Dictionary), its Gram matrix uploaded once, or for one call |
 //!
 //! The kernels, and how they pursue a frame, are in [`nirspi_gpu::pursuit`].
 //!
@@ -27,6 +27,6 @@ mod images;
 
 pub use choice::{Choice, FRAMES_WORTH_A_GPU, choose};
 pub use device::Device;
-pub use dictionary::{DeviceDictionary, DeviceFrames, DevicePictures, path_over, solve_batch_over};
+pub use dictionary::{DeviceDictionary, DeviceFrames, DevicePictures, OverDevice, path_over};
 pub use gram::DeviceSolutions;
 pub use images::{DeviceImages, HostImages};

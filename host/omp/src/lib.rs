@@ -11,6 +11,7 @@
 //! | [`mod@reference`] | the paper's Algorithm 1 line by line, in `f64`: every other implementation is checked against it |
 //! | [`Solver`] | the same support and coefficients, fast, in `f32` or `f64`, one measurement at a time |
 //! | [`solve_batch`], [`solve_path`] | many measurements of one [`Problem`], or one, on a [`Backend`] chosen at run time |
+//! | [`StackSolver`] | batch after batch of one [`Problem`], by a GPU as long as it works |
 //! | [`Dictionary`] | the interface of a dictionary: projections, and columns of the Gram matrix |
 //! | [`DenseDictionary`] | a dictionary that is a matrix |
 //! | [`MixedDictionary`] | the same in `f32`, with choices in `f64` where `f32` cannot distinguish two atoms |
@@ -57,7 +58,7 @@ pub use dense::DenseDictionary;
 pub use dictionary::{Atoms, Dictionary, padded};
 pub use errors::BackendError;
 pub use mixed::{MixedDictionary, MixedSolver};
-pub use on_backend::{solve_batch, solve_path};
+pub use on_backend::{StackSolver, solve_batch, solve_path};
 pub use path::Path;
 pub use pursuit::{Solver, error_bound};
 pub use remembered::Remembered;

@@ -72,6 +72,7 @@ use crate::omp::{Backend, Limits, OmpError, Stop};
 use crate::{Image, Measurements, Order, Rows, Side, fwht};
 use noise::Statistics;
 use pursuit::{Found, How};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// The order for taking a part of recorded measurements, unless the user names another one: the
@@ -223,6 +224,19 @@ pub struct OmpReconstruction {
     pub trust: f64,
     /// Noise of a measurement, estimated or given, in the measurements' units.
     pub noise: f64,
+    /// What computed, where that was found out with the stack; `None` for what the settings ask for.
+    pub by: Option<ComputedBy>,
+}
+
+/// What computed an image.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ComputedBy {
+    /// The backend.
+    pub backend: Backend,
+    /// The name of the GPU, if one computed.
+    pub device: Option<Arc<str>>,
+    /// Why, in one line, where that was not the user's choice.
+    pub said: Option<Arc<str>>,
 }
 
 /// Why there is no image.
@@ -344,6 +358,7 @@ fn reconstruction(
         unseen_atoms: found.unseen,
         trust: f64::from(choice.trust),
         noise: problem.noise_in_units(),
+        by: None,
     }
 }
 

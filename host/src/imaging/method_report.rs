@@ -78,6 +78,7 @@ impl Serialize for MethodReport {
             basis: made.basis.as_deref(),
             backend: made.backend.map(Backend::name),
             device: made.device.as_deref(),
+            computed: made.computed.as_deref(),
             strength: made.strength,
             sparsity: made.sparsity,
             weight_of_readings: made.reading_weight,
@@ -125,6 +126,8 @@ struct Details<'r> {
     backend: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     device: Option<&'r str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    computed: Option<&'r str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     strength: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -181,14 +181,22 @@ fn grey(
     smooth: bool,
 ) {
     let rows = levels.len() as u32 / columns;
-    let image: ImageBuffer<Luma<u8>, _> = ImageBuffer::from_raw(columns, rows, levels.to_vec())
-        .expect("an image has rows of so many columns");
-    let filter = if smooth { FilterType::Triangle } else { FilterType::Nearest };
-    let shown = imageops::resize(&image, wide, high, filter);
-    for (x, y, Luma([level])) in shown.enumerate_pixels() {
+    let mut put = |x: u32, y: u32, level: u8| {
         if let Some(pixel) = canvas.get_pixel_mut_checked(left + x, top + y) {
-            *pixel = Rgb([*level; 3]);
+            *pixel = Rgb([level; 3]);
         }
+    };
+    if smooth {
+        let image: ImageBuffer<Luma<u8>, _> = ImageBuffer::from_raw(columns, rows, levels.to_vec())
+            .expect("an image has rows of so many columns");
+        let shown = imageops::resize(&image, wide, high, FilterType::Triangle);
+        shown.enumerate_pixels().for_each(|(x, y, Luma([level]))| put(x, y, *level));
+        return;
+    }
+    for y in 0..high {
+        let row = (y * rows / high * columns) as usize;
+        let row = &levels[row..row + columns as usize];
+        (0..wide).for_each(|x| put(x, y, row[(x * columns / wide) as usize]));
     }
 }
 

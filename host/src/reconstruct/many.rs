@@ -176,6 +176,8 @@ pub(super) fn file_images(
             0 => all_warnings(source, &report),
             _ => source.warnings.clone(),
         };
+        let computed = report.made.computed.as_deref().map(str::to_owned);
+        let notes = losses(source).chain(source.notes.iter().cloned()).chain(computed);
         FileImage {
             file: file.to_owned(),
             index: part.several.then_some(index),
@@ -187,7 +189,7 @@ pub(super) fn file_images(
             recorded: source.frames.is_some(),
             report,
             outliers: source.outliers.iter().map(OutlierReport::of).collect(),
-            notes: losses(source).chain(source.notes.iter().cloned()).collect(),
+            notes: notes.collect(),
             warnings,
             taken: source.taken.clone(),
         }

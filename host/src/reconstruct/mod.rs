@@ -3,6 +3,7 @@
 
 mod frame_reports;
 mod many;
+mod networks;
 mod one;
 mod own;
 mod pipeline;
@@ -13,6 +14,7 @@ mod stack;
 
 pub use frame_reports::FrameReports;
 pub use many::Skipped;
+pub use networks::NetworksError;
 pub use one::{DropoutReport, LampReport, OneReport};
 pub use own::{OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, own_image};
 pub use pipeline::{Pipeline, ResultFolder};
@@ -24,4 +26,5 @@ pub use solver::{
 pub use stack::{StackReport, Step, Watch};
 
 use many::FileImage;
+use networks::Networks;
 use one::write_image;

@@ -1,11 +1,11 @@
 //! One image, its pictures and its report, in a folder.
 
 use super::many::all_warnings;
-use super::{PipelineError, ResultFolder, Solved, Solver, not_read_words};
+use super::{Networks, PipelineError, ResultFolder, Solved, Solver, not_read_words};
 use crate::account::LossCounters;
 use crate::files::output::OutputDir;
 use crate::files::{FileError, npy};
-use crate::imaging::{Enhance, FrameReport, MethodReport, enhance_frames_by};
+use crate::imaging::{FrameReport, MethodReport, enhance_frames_by};
 use crate::picture::{Pictures, Unit};
 use crate::source::{OutlierReport, Part, Source};
 use crate::stage_times::StageTimes;
@@ -155,7 +155,7 @@ impl OneReport {
 /// Reconstructs one image and writes it with its pictures and its report.
 pub(super) fn one_image(
     solver: &Solver,
-    networks: Option<&Enhance>,
+    networks: Option<&Networks>,
     source: Source,
     folder: &ResultFolder<'_>,
     mut times: StageTimes,
@@ -172,7 +172,7 @@ pub(super) fn one_image(
     let (sharp, enhancement) = match networks {
         Some(networks) => {
             let given = [(&with_readings, used.rows())];
-            let (sharp, mut reports) = enhance_frames_by(networks, &given, &mut times)?;
+            let (sharp, mut reports) = enhance_frames_by(networks.for_one(), &given, &mut times)?;
             (Some(sharp), reports.pop())
         }
         None => (None, None),

@@ -4,12 +4,12 @@ use super::many::{FileImage, Part, file_images, many_images};
 use super::one::{OneReport, one_image};
 use super::pipeline_error::PipelineError;
 use super::stack::{StackReport, Step, Watch, Writing};
-use super::{Solver, SolverError};
-use crate::imaging::Enhance;
+use super::{Networks, NetworksError, Solver, SolverError};
 use crate::picture::FigureStyle;
 use crate::provenance::Made;
 use crate::source::{Source, SourceOptions, Sources};
 use crate::stage_times::StageTimes;
+use nirspi_recon::Backend;
 use nirspi_recon::reconstruct::{AT_A_TIME, ReconstructError};
 use nirspi_recon::words::count_of;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ const FILES_AT_A_TIME: usize = 256;
 /// A method, and the networks that also enlarge and deblur its images, if they are wanted.
 pub struct Pipeline {
     solver: Solver,
-    networks: Option<Enhance>,
+    networks: Option<Networks>,
 }
 
 /// Where results go, and what is said of them.
@@ -58,10 +58,13 @@ impl Pipeline {
         Self { solver, networks: None }
     }
 
-    /// The same, with networks after it.
-    #[must_use]
-    pub fn with_networks(self, networks: Enhance) -> Self {
-        Self { networks: Some(networks), ..self }
+    /// The same, with networks after it, on this backend. A GPU that fails in the middle of a stack gets fewer images at a time,
+    /// and then the processor takes over.
+    ///
+    /// # Errors
+    /// [`NetworksError`] if the requested device is missing, or the built-in weights are damaged.
+    pub fn with_networks(self, backend: Backend) -> Result<Self, NetworksError> {
+        Ok(Self { networks: Some(Networks::on(backend)?), ..self })
     }
 
     /// Makes one image and writes it with its pictures and its report.

@@ -6,10 +6,10 @@
 use super::frame_reports::{FrameReports, Writer};
 use super::pipeline_error::PipelineError;
 use super::said::{AllSaid, Kind};
-use super::{FileImage, ResultFolder, Skipped};
+use super::{FileImage, Networks, ResultFolder, Skipped};
 use crate::files::output::{Growing, OutputDir};
 use crate::files::{FileError, npy};
-use crate::imaging::{Enhance, FrameReport, MethodReport, White, enhance_alike};
+use crate::imaging::{FrameReport, MethodReport, White};
 use crate::picture::{Pictures, Sheet, Unit, chosen};
 use crate::provenance::Taken;
 use crate::source::OutlierReport;
@@ -126,7 +126,7 @@ impl<'r> Writing<'r> {
     /// Begins a stack of images like this one.
     pub(super) fn new(
         folder: &'r ResultFolder<'r>,
-        networks: Option<&'r Enhance>,
+        networks: Option<&'r Networks>,
         first: &FileImage,
     ) -> Result<Self, FileError> {
         let out = OutputDir::create(folder.out)?;
@@ -329,7 +329,7 @@ fn values(bytes: &[u8]) -> impl Iterator<Item = f32> {
 
 /// Images as networks take them, until all of a file are there.
 struct ForNetworks<'r> {
-    networks: &'r Enhance,
+    networks: &'r Networks,
     pixels: BufWriter<File>,
     /// Images one after another that are alike, of which `levels` has the white level of each.
     alike: Vec<Alike>,
@@ -352,7 +352,7 @@ struct Enhanced<'s> {
 }
 
 impl<'r> ForNetworks<'r> {
-    fn new(networks: &'r Enhance, file: File) -> Self {
+    fn new(networks: &'r Networks, file: File) -> Self {
         Self { networks, pixels: BufWriter::with_capacity(1 << 16, file), alike: Vec::new() }
     }
 
@@ -384,6 +384,7 @@ impl<'r> ForNetworks<'r> {
             Ok(file)
         };
         let mut pixels = BufReader::with_capacity(1 << 16, rewound().map_err(wrong)?);
+        let mut turns = networks.turns();
         for of_file in alike.chunk_by(|a, b| a.file == b.file) {
             let levels = of_file.iter().flat_map(|alike| alike.levels.iter().copied());
             let white = White::median(levels);
@@ -402,13 +403,17 @@ impl<'r> ForNetworks<'r> {
                     });
                     let images: Vec<Image> = read.collect::<io::Result<_>>().map_err(wrong)?;
                     let images: Vec<&Image> = images.iter().collect();
-                    let results = enhance_alike(networks, &images, &alike.rows, white)?;
+                    let results = networks.enhance(&mut turns, &images, &alike.rows, white)?;
                     for (at, (sharp, report)) in results.into_iter().enumerate() {
                         made.push(number + at, alike, &sharp, &report).map_err(wrong)?;
                     }
                     number += some;
                 }
             }
+        }
+        if let (Some(said), Some(first)) = (turns.said(), alike.first()) {
+            let said = format!("networks: {said}");
+            made.said.add(Kind::Note, &said, 0, || (first.file.clone(), None));
         }
         Ok(())
     }

@@ -418,33 +418,49 @@ fn confirmed(matrix: &DMatrix<f64>, atoms: &Atoms<f32>, marks: &[u32]) -> Vec<(u
     pairs.collect()
 }
 
-/// Solves a batch over any dictionary: uploads its Gram matrix column by column, and takes the
-/// initial projections from the dictionary. Nothing is kept for a next batch.
-///
-/// # Errors
-/// [`OmpError`] if a number is not finite, a limit is negative or NaN, or the device fails.
-pub fn solve_batch_over<T: Scalar, D: Dictionary<T> + ?Sized>(
-    device: &Device,
-    dictionary: &D,
-    limits: &Limits,
-    y: &[T],
-) -> Result<Vec<Solution>, OmpError> {
-    let gram = columns_of(device, dictionary)?;
-    let measurements = dictionary.measurements();
-    let at_once = gram.frames_at_once(limits.sparsity)?;
-    let mut solutions = Vec::new();
-    for y in y.chunks(at_once * measurements) {
-        let found = gram.read(&pursue_over(&gram, dictionary, limits, y)?)?;
-        solutions.extend(found.into_iter().map(|found| found.solution));
+/// Any dictionary whose Gram matrix is on a device; the initial projections come from the dictionary.
+pub struct OverDevice<'d, D: ?Sized> {
+    dictionary: &'d D,
+    gram: DeviceGram,
+}
+
+impl<'d, D: ?Sized> OverDevice<'d, D> {
+    /// Uploads the Gram matrix column by column.
+    ///
+    /// # Errors
+    /// [`OmpError`] if the device fails, or cannot compute with these numbers.
+    pub fn new<T: Scalar>(device: &Device, dictionary: &'d D) -> Result<Self, OmpError>
+    where
+        D: Dictionary<T>,
+    {
+        Ok(Self { dictionary, gram: columns_of(device, dictionary)? })
     }
-    Ok(solutions)
+
+    /// Solves a batch.
+    ///
+    /// # Errors
+    /// [`OmpError`] if a number is not finite, a limit is negative or NaN, or the device fails.
+    pub fn solve<T: Scalar>(&self, limits: &Limits, y: &[T]) -> Result<Vec<Solution>, OmpError>
+    where
+        D: Dictionary<T>,
+    {
+        let Self { dictionary, gram } = self;
+        let measurements = dictionary.measurements();
+        let at_once = gram.frames_at_once(limits.sparsity)?;
+        let mut solutions = Vec::new();
+        for y in y.chunks(at_once * measurements) {
+            let found = gram.read(&pursue_over(gram, *dictionary, limits, y)?)?;
+            solutions.extend(found.into_iter().map(|found| found.solution));
+        }
+        Ok(solutions)
+    }
 }
 
 /// Pursues one measurement over any dictionary, as [`Solver::solve`](crate::Solver::solve)
 /// does.
 ///
 /// # Errors
-/// The errors of [`solve_batch_over`].
+/// The errors of [`OverDevice`].
 pub fn path_over<D: Dictionary<f32> + ?Sized>(
     device: &Device,
     dictionary: &D,

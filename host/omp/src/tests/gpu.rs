@@ -189,8 +189,17 @@ fn a_dictionary_of_fast_transforms_has_the_same_path() {
             assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-4), "{a:?} and {b:?}");
         }
         let problem = crate::Problem { dictionary: &dictionary, limits };
-        let batch = solve_batch(&problem, &[y.clone(), y].concat(), device.backend()).unwrap();
+        let two = [y.clone(), y].concat();
+        let batch = solve_batch(&problem, &two, device.backend()).unwrap();
         assert_eq!([&batch[0].support, &batch[1].support], [&exact.support; 2]);
+        // The same by a solver that keeps the dictionary on the device.
+        let mut stack = StackSolver::new(&problem, device.backend(), 4).unwrap();
+        for _ in 0..2 {
+            assert_eq!(stack.solve(&two).unwrap(), (batch.clone(), 2));
+        }
+        assert_eq!((&**stack.turns().device(), stack.turns().said()), (device.name(), None));
+        let refused = stack.solve(&[f32::NAN; 3]).unwrap_err();
+        assert!(matches!(refused, OmpError::Length { .. }), "{refused}");
     }
 }
 

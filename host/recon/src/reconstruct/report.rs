@@ -4,6 +4,7 @@ use super::HeldBack;
 use crate::words::count_of;
 use crate::{Backend, Image, Measurements, fwht};
 use std::fmt;
+use std::sync::Arc;
 
 /// An image and how it was made.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +41,8 @@ pub struct Report {
     pub backend: Option<Backend>,
     /// Name of the GPU, if a GPU computed.
     pub device: Option<String>,
+    /// Why the processor or a GPU computed, in one line, where that was not the user's choice.
+    pub computed: Option<Arc<str>>,
     /// Strength of a penalty, relative to what noise and prior call for.
     pub strength: Option<f64>,
     /// Number of atoms in the representation.
@@ -76,6 +79,7 @@ impl Report {
             basis: None,
             backend: None,
             device: None,
+            computed: None,
             strength: None,
             sparsity: None,
             reading_weight: None,

@@ -3,14 +3,17 @@
 use super::{Common, GoingOn, problems};
 use crate::Measurements;
 use crate::omp::sampled::{Prior, SampledHadamard};
-use crate::omp::{self, Limits, Remembered, solve_batch};
+use crate::omp::{self, Backend, Limits, Remembered, StackSolver};
 use crate::reconstruct::{
-    Made, OmpReconstruction, OmpSettings, Problem, ReconstructError, Sparsity, in_units, selection,
+    ComputedBy, Made, OmpReconstruction, OmpSettings, Problem, ReconstructError, Sparsity,
+    in_units, selection,
 };
 use rayon::prelude::*;
+use std::sync::Arc;
 
-/// Measurements that are pursued at a time: enough for all processors, few enough for the memory.
+/// Measurements that are pursued at a time: enough for all processors, few enough for the memory, and for a device more.
 const AT_A_TIME: usize = 256;
+const AT_A_TIME_ON_DEVICE: usize = 4096;
 
 /// The images of measurements of one kind; `None` if these settings have to look at each by itself.
 pub(in super::super) fn omp_kind(
@@ -47,15 +50,29 @@ pub(in super::super) fn omp_kind(
     let dictionary = Remembered::new(plain);
     let limits = Limits { sparsity: atoms, ..first.limits() };
     let pursuit = omp::Problem { dictionary: &dictionary, limits };
-    let mut made = Vec::with_capacity(measurements.len());
-    for together in measurements.chunks(AT_A_TIME) {
+    let mut solver = StackSolver::new(&pursuit, settings.backend, measurements.len())?;
+    let mut made: Vec<OmpReconstruction> = Vec::with_capacity(measurements.len());
+    while made.len() < measurements.len() {
         going_on()?;
+        let most = if solver.turns().has_device() { AT_A_TIME_ON_DEVICE } else { AT_A_TIME };
+        let together = &measurements[made.len()..];
+        let together = &together[..most.min(together.len())];
         let values: Vec<f32> =
             together.par_iter().flat_map_iter(|measured| in_units(measured).0).collect();
-        let solutions = solve_batch(&pursuit, &values, settings.backend)?;
-        let images = together.par_iter().zip(solutions).map_init(
+        let (solutions, on_device) = solver.solve(&values)?;
+        let said = solver.turns().said().cloned();
+        let device = solver.backend().map(|backend| (backend, Arc::clone(solver.turns().device())));
+        let by = [
+            ComputedBy { backend: Backend::Cpu, device: None, said: said.clone() },
+            device.map_or(ComputedBy::default(), |(backend, name)| ComputedBy {
+                backend,
+                device: Some(name),
+                said,
+            }),
+        ];
+        let images = together.par_iter().zip(solutions).enumerate().map_init(
             || first.clone(),
-            |problem, (measured, solution)| {
+            |problem, (at, (measured, solution))| {
                 problem.read(measured, settings.noise);
                 let predicted =
                     dictionary.dictionary().predict(&solution.support, &solution.coefficients);
@@ -63,7 +80,8 @@ pub(in super::super) fn omp_kind(
                     true => Made::of_prediction(problem, predicted),
                     false => common.made(problem, predicted),
                 };
-                reconstruction(problem, &solution, found, &common)
+                let by = Some(by[usize::from(at < on_device)].clone());
+                OmpReconstruction { by, ..reconstruction(problem, &solution, found, &common) }
             },
         );
         made.par_extend(images);
@@ -87,6 +105,7 @@ fn reconstruction(
         unseen_atoms: solution.unseen.len(),
         trust: f64::from(common.trust),
         noise: problem.noise_in_units(),
+        by: None,
     }
 }
 

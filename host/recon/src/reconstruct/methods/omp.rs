@@ -5,10 +5,11 @@ use crate::reconstruct::kind::omp_kind;
 use crate::reconstruct::method::{Entry, OwnAtoms, Setting};
 use crate::reconstruct::stack::{each, with_common_noise};
 use crate::reconstruct::{
-    GoingOn, MatrixMethod, Method, MethodSettings, OmpReconstruction, OmpSettings, Reconstruct,
-    ReconstructError, Reconstruction, Report, omp, omp_over, omp_video,
+    ComputedBy, GoingOn, MatrixMethod, Method, MethodSettings, OmpReconstruction, OmpSettings,
+    Reconstruct, ReconstructError, Reconstruction, Report, omp, omp_over, omp_video,
 };
 use crate::{Backend, Measurements};
+use std::sync::Arc;
 
 const NAME: &str = "OMP";
 
@@ -35,7 +36,7 @@ struct Omp {
     settings: OmpSettings,
     atoms: Option<OwnAtoms>,
     /// Name of the GPU, if a GPU computes.
-    device: Option<String>,
+    device: Option<Arc<str>>,
 }
 
 impl Omp {
@@ -46,12 +47,14 @@ impl Omp {
             false => OmpSettings { basis: asked.basis, ..OmpSettings::default() },
         };
         let settings = OmpSettings {
-            backend: if device.is_some() { asked.backend } else { Backend::Cpu },
+            // Whether a GPU is worth it is found out with a stack.
+            backend: asked.backend,
             sparsity: asked.sparsity,
             residual: asked.residual,
             non_negative: asked.non_negative,
             ..base
         };
+        let device = device.map(Into::into);
         Ok(Self { settings, atoms: asked.dictionary.clone(), device })
     }
 
@@ -62,8 +65,14 @@ impl Omp {
             None => basis.to_string(),
             Some(atoms) => atoms.name.clone(),
         });
-        report.backend = Some(backend);
-        report.device = self.device.clone();
+        let by = found.by.unwrap_or_else(|| ComputedBy {
+            backend: if self.device.is_some() { backend } else { Backend::Cpu },
+            device: self.device.clone(),
+            said: None,
+        });
+        report.backend = Some(by.backend);
+        report.device = by.device.as_deref().map(str::to_owned);
+        report.computed = by.said;
         report.sparsity = Some(found.sparsity);
         report.reading_weight = Some(found.reading_weight);
         report.held_back = found.held_back;
