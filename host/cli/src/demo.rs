@@ -144,7 +144,7 @@ struct Report<'a> {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    args.method.check()?;
+    args.method.check(false)?;
     OutputDir::create(&args.out)?.check(["scene.png", "truth.npy", "report.json"])?;
     let described = args.scene.model.read()?;
     let scene = args.scene(&described);

@@ -62,9 +62,9 @@ impl Default for MethodArgs {
 }
 
 impl MethodArgs {
-    /// Checks the arguments before any file is opened.
-    pub fn check(&self) -> Result<()> {
-        let mut settings = self.settings()?;
+    /// Checks the arguments before any file is opened. With networks after the method, the backend may be theirs alone.
+    pub fn check(&self, networks: bool) -> Result<()> {
+        let mut settings = self.settings_before(networks)?;
         // The file is read later; the check only needs to know that there is one.
         settings.dictionary = self.dictionary.as_ref().map(|path| own_atoms(path, Vec::new()));
         settings.check(self.method).map_err(|error| Usage(self.words(&error)).into())
@@ -118,6 +118,15 @@ impl MethodArgs {
         })
     }
 
+    /// The requested settings of a method that has networks after it or not.
+    fn settings_before(&self, networks: bool) -> Result<MethodSettings> {
+        let settings = self.settings()?;
+        match networks && !self.method.takes(reconstruct::Setting::Backend) {
+            true => Ok(MethodSettings { backend: Backend::Auto, ..settings }),
+            false => Ok(settings),
+        }
+    }
+
     /// The requested settings for images of this side. Reads the user's files.
     pub fn settings_for(&self, side: usize) -> Result<MethodSettings> {
         let read = |path: &PathBuf| anyhow::Ok(own_atoms(path, read_atoms(path, (side, side))?));
@@ -133,7 +142,7 @@ impl MethodArgs {
         enhance: bool,
     ) -> Result<Pipeline> {
         let (method, settings, dictionary) =
-            (self.method, self.settings()?, self.dictionary.clone());
+            (self.method, self.settings_before(enhance)?, self.dictionary.clone());
         let solver = Solver::new(Recipe { method, settings, dictionary, first, sampling })?;
         Ok(match enhance {
             true => Pipeline::new(solver).with_networks(self.backend)?,

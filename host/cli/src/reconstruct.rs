@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         Some("recorded") => FirstPatterns::Recorded,
         Some(order) => FirstPatterns::Of(parse_order("--order", order)?),
     };
-    args.method.check()?;
+    args.method.check(args.enhance)?;
     OutputDir::create(&args.out)?.check(["image.npy", "report.json"])?;
     if args.source.input.is_dir() || !args.more.is_empty() {
         return stack::of_files(args, first);

@@ -130,7 +130,7 @@ impl Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    args.method.check()?;
+    args.method.check(false)?;
     if let Some(address) = args.camera.feed() {
         return run_feed(args, address);
     }

@@ -1,4 +1,22 @@
 //! From measurements to images and pictures: one measurement, all of a file or recording, many files.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let made = nirspi::provenance::Made::by("my program", None, ["my program"], 0);
+//! # let (file, out) = (std::path::Path::new("rec.mcap"), std::path::Path::new("out"));
+//! use nirspi::reconstruct::{Pipeline, Recipe, ResultFolder, Solver};
+//! use nirspi::source::{Source, SourceOptions};
+//! let pipeline = Pipeline::new(Solver::new(Recipe::default())?).with_networks("cpu".parse()?)?;
+//! let source = Source::read(file, &SourceOptions::default())?;
+//! let folder = ResultFolder::of_file(file, out, &made, Default::default());
+//! let report = pipeline.one(source, &folder, Default::default())?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Invariant
+//! The program `nirspi` gives the pictures that a program of this kind gives, for one measurement and for stacks
+//! (`one_recording_gives_one_picture_through_every_door` in `host/cli/tests/cli/doors.rs`).
 
 use super::many::{FileImage, Part, file_images, many_images};
 use super::one::{OneReport, one_image};

@@ -30,6 +30,19 @@ pub struct Recipe {
     pub sampling: Sampling,
 }
 
+impl Default for Recipe {
+    /// The default method with the shipped network, on all patterns.
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            settings: nirspi_nets::prior::settings(),
+            dictionary: None,
+            first: FirstPatterns::default(),
+            sampling: Sampling::ALL,
+        }
+    }
+}
+
 /// A recipe, ready for measurements of any side.
 pub struct Solver {
     recipe: Recipe,

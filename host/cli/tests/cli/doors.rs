@@ -5,8 +5,12 @@ use crate::serve::serve;
 use nirspi::calibration::FlatField;
 use nirspi::files::image::read_grey;
 use nirspi::imaging::enhance_frames;
-use nirspi::source::{Source, SourceOptions};
+use nirspi::picture::FigureStyle;
+use nirspi::provenance::Made;
+use nirspi::reconstruct::{Pipeline, Recipe, ResultFolder, Solver};
+use nirspi::source::{Source, SourceOptions, Sources};
 use nirspi::stage_times::StageTimes;
+use nirspi_recon::Backend;
 use nirspi_recon::reconstruct::Method;
 
 /// Bright LEDs that differ by a fifth, one of them dead, so that the flat field shows.
@@ -35,13 +39,35 @@ fn one_recording_gives_one_picture_through_every_door() {
     let picture = |folder: &str| read_grey(&bench.path(&format!("{folder}/enhanced.png"))).unwrap();
     assert_eq!(picture("seen"), picture("rec"));
 
-    // The library's functions, as `demo` calls them. The flat field lies where the program kept it.
+    // A program that calls the library, of one picture and of a stack. The flat field lies where the program kept it.
+    done(&bench, &["reconstruct", "rec.mcap", "--index", "all", "--enhance", "--out", "all"]);
+    let made = Made::by("a test", None, ["a test"], 0);
+    let solver = Solver::new(Recipe::default()).unwrap();
+    let pipeline = Pipeline::new(solver).with_networks(Backend::Cpu).unwrap();
+    let (recording, options) = (bench.path("rec.mcap"), SourceOptions::default());
+    let folder = |out| ResultFolder::of_file(&recording, out, &made, FigureStyle::Paper);
+    let (one, all) = (bench.path("library"), bench.path("library-all"));
+    let flat = kept(&bench);
+    let mut source = Source::read(&recording, &options).unwrap();
+    source.flat_field = Some(flat.clone());
+    pipeline.one(source, &folder(&one), StageTimes::default()).unwrap();
+    let sources = Sources::open(&recording, &options).unwrap();
+    pipeline.all(sources, &folder(&all), &|_| true, StageTimes::default()).unwrap();
+    let plain = ["reconstruct", "rec.mcap", "--no-flat-field", "--index", "all", "--enhance"];
+    done(&bench, &[&plain[..], &["--out", "all-plain"]].concat());
+    for name in ["image.npy", "enhanced.npy"] {
+        let bytes = |folder: &str| std::fs::read(bench.path(&format!("{folder}/{name}"))).unwrap();
+        assert_eq!(bytes("library"), bytes("rec"), "{name}");
+        assert_eq!(bytes("library-all"), bytes("all-plain"), "{name}");
+        assert_ne!(bytes("all"), bytes("all-plain"), "{name}");
+    }
+
+    // The library's functions, as `demo` calls them.
     let source = Source::read(&bench.path("rec.mcap"), &SourceOptions::default()).unwrap();
     assert!(source.flat_field.is_none(), "a flat field of this user's own");
     let ready = Method::default().prepare(&nirspi_nets::prior::settings()).unwrap();
     let made = ready.reconstruct(&source.measurements).unwrap();
     let image = made.image.clone();
-    let flat = kept(&bench);
     assert_eq!(image.pixels(), bench.pixels("plain/image.npy"));
     let given = FlatField::corrected(Some(&flat), made.with_readings(&source.measurements));
     let image = FlatField::corrected(Some(&flat), image);
