@@ -9,8 +9,8 @@ use nirspi::provenance::Made;
 use nirspi::reconstruct::{Pipeline, PipelineError, Recipe, ResultFolder, Solver, StackReport};
 use nirspi::source::{FirstPatterns, Source, SourceOptions, Sources};
 use nirspi::stage_times::StageTimes;
-use nirspi_recon::Sampling;
 use nirspi_recon::reconstruct::{AT_A_TIME, Method, MethodSettings};
+use nirspi_recon::{Backend, Sampling};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -111,6 +111,33 @@ fn images_before_a_wrong_measurement_are_written_with_the_reason() {
     }
     let path = file(folder.path(), 3, |_, values| values.fill(f64::NAN));
     assert!(matches!(images(&path, || true), Err(PipelineError::Source(_))));
+}
+
+#[test]
+fn a_stack_that_cannot_be_written_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = file(folder.path(), AT_A_TIME + 9, |_, _| ());
+    // Taken while the images are made.
+    let image = folder.path().join("out/image.npy");
+    let take = || {
+        if image.parent().unwrap().exists() && !image.exists() {
+            std::fs::write(&image, b"mine").unwrap();
+        }
+        true
+    };
+    assert!(matches!(images(&path, take), Err(PipelineError::File(_))));
+    let left = |folder: &Path| std::fs::read_dir(folder).unwrap().count();
+    assert_eq!((left(&folder.path().join("out")), left(folder.path())), (1, 2));
+    assert_eq!(std::fs::read(&image).unwrap(), b"mine");
+    // The folders that a run has made go with it: networks take no images of 4 x 4.
+    let (options, made) = (SourceOptions::default(), made());
+    let out = folder.path().join("made/for/it");
+    let results = ResultFolder::of_file(&path, &out, &made, FigureStyle::Paper);
+    let pipeline = Pipeline::new(solver(Method::HADAMARD)).with_networks(Backend::Cpu).unwrap();
+    let sources = Sources::open(&path, &options).unwrap();
+    let refused = pipeline.all(sources, &results, &|_| true, StageTimes::default());
+    assert!(matches!(refused, Err(PipelineError::Networks(_))));
+    assert!(!folder.path().join("made").exists());
 }
 
 #[test]

@@ -110,7 +110,6 @@ pub type Watch<'w> = &'w (dyn Fn(Step) -> bool + Sync);
 /// A stack that is being written.
 pub(super) struct Writing<'r> {
     folder: &'r ResultFolder<'r>,
-    out: OutputDir,
     networks: Option<ForNetworks<'r>>,
     images: Images,
     reports: Writer,
@@ -120,6 +119,8 @@ pub(super) struct Writing<'r> {
     warm: usize,
     last: (usize, String),
     said: AllSaid,
+    /// The last to be dropped: a folder that the run has made can go when no file is in it.
+    out: OutputDir,
 }
 
 impl<'r> Writing<'r> {
