@@ -40,16 +40,18 @@ mod complete;
 mod error;
 mod folds;
 mod gram;
+mod live;
 mod many;
 mod problem;
 mod pseudo_inverse;
 mod solvers;
 
-use super::Penalty;
+use super::{Method, MethodSettings, Penalty, ReconstructError, Sparsity, Strength};
 use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
 use crate::{Image, Shape, Size};
 pub use error::MatrixError;
+pub use live::LiveMatrix;
 use nalgebra::{DMatrix, DVector};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -102,6 +104,30 @@ pub struct MatrixSettings {
 }
 
 impl MatrixSettings {
+    /// The settings of a method for a user's own patterns.
+    ///
+    /// # Errors
+    /// [`ReconstructError::NeedsRows`] if the method has none.
+    pub fn of(method: Method, settings: &MethodSettings) -> Result<Self, ReconstructError> {
+        let needs_rows = ReconstructError::NeedsRows { method };
+        let strength = match settings.strength {
+            Strength::Fixed(strength) => Some(strength),
+            Strength::CrossValidated { .. } => None,
+        };
+        let sparsity = match settings.sparsity {
+            Sparsity::Fixed(atoms) => Some(atoms),
+            Sparsity::CrossValidated { .. } | Sparsity::Noise => None,
+        };
+        Ok(Self {
+            basis: settings.basis,
+            atoms: settings.dictionary.as_ref().map(|atoms| atoms.values.to_vec()),
+            strength,
+            sparsity,
+            non_negative: settings.non_negative,
+            ..Self::new(method.with_matrix().ok_or(needs_rows)?)
+        })
+    }
+
     /// Default settings: all values are found from the measurements, in the DCT basis.
     #[must_use]
     pub fn new(method: MatrixMethod) -> Self {
@@ -284,18 +310,20 @@ impl OwnMatrix {
         all: &[&[f64]],
         settings: &MatrixSettings,
     ) -> Result<Vec<MatrixReconstruction>, MatrixError> {
+        self.check(all, settings)?;
+        let kept = many::Kept::default();
+        let batches =
+            all.chunks(BATCH).map(|all| many::Many::new(self, settings, all, &kept).images());
+        Ok(batches.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
+    fn check(&self, all: &[&[f64]], settings: &MatrixSettings) -> Result<(), MatrixError> {
         for y in all {
             if y.len() != self.patterns() {
                 return Err(MatrixError::Length { found: y.len(), expected: self.patterns() });
             }
             finite("y", y, 1)?;
         }
-        self.check(settings)?;
-        let batches = all.chunks(BATCH).map(|all| many::Many::new(self, settings, all).images());
-        Ok(batches.collect::<Result<Vec<_>, _>>()?.concat())
-    }
-
-    fn check(&self, settings: &MatrixSettings) -> Result<(), MatrixError> {
         let (size, area) = (self.size, self.size.area());
         if let Some(atoms) = &settings.atoms {
             if atoms.is_empty() || !atoms.len().is_multiple_of(area) {
