@@ -70,7 +70,8 @@ function draw(panel, picture) {
 // The value under the cursor.
 function point(panel) {
   const cell = $(`${panel.id}-cell`), says = $(`${panel.id}-value`);
-  const is = panel.cell !== null && panel.values !== null;
+  // The next image may be smaller.
+  const is = panel.cell?.[0] < panel.width && panel.cell[1] < panel.height && panel.values !== null;
   cell.hidden = !is;
   if (!is) return text(says, "");
   const [x, y] = panel.cell, value = panel.values[y * panel.width + x];
