@@ -6,7 +6,7 @@
 
 use super::FileError;
 use super::archive::Archive;
-use super::field::{EXPECTED, Field};
+use super::field::{EXPECTED, Field, is_counter};
 #[cfg(feature = "hdf5")]
 use super::hdf5::Hdf5;
 use super::mat::Mat;
@@ -27,6 +27,9 @@ const START_BYTES: u64 = 520;
 const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// The largest `.mat` or HDF5 file taken into memory.
 const MAX_FILE_BYTES: u64 = 1 << 30;
+
+/// Fewest lines of a table whose columns may count.
+const FEWEST: usize = 8;
 
 /// An open file.
 pub(super) struct Fields {
@@ -189,6 +192,49 @@ impl Fields {
     /// What a text has beside its table and is left out, in one line.
     pub(super) fn skipped(&self) -> Option<&str> {
         self.skipped.as_deref()
+    }
+
+    /// Adds a note to what is told of a text.
+    pub(super) fn note(&mut self, note: String) {
+        let before = self.skipped.take().map(|skipped| skipped + "; ").unwrap_or_default();
+        self.skipped = Some(before + &note);
+    }
+
+    /// The only column of a text that does not count in even steps, as times and numbers of lines do: its name, if columns
+    /// have names. That the others are left out is told. `None` if there is no such column, or no other.
+    pub(super) fn column_beside_counters(&mut self) -> Option<String> {
+        let named: Vec<(String, Field)> = match &self.format {
+            Format::Columns(columns) => {
+                self.names.iter().cloned().zip(columns.iter().cloned()).collect()
+            }
+            Format::Unnamed(table) if self.is_text => match table.shape[..] {
+                [lines, width] if lines >= FEWEST && width > 1 => table.columns(width),
+                _ => return None,
+            },
+            _ => return None,
+        };
+        let (counters, others): (Vec<_>, Vec<_>) =
+            named.into_iter().partition(|(_, column)| is_counter(&column.real));
+        let [(only, column)] = &others[..] else { return None };
+        if counters.is_empty() {
+            return None;
+        }
+        let names: Vec<String> = counters.iter().map(|(name, _)| format!("`{name}`")).collect();
+        self.note(format!("left out: columns that count in even steps: {}", names.join(", ")));
+        if self.is_unnamed() {
+            self.format = Format::Unnamed(column.clone());
+        }
+        Some(only.clone())
+    }
+
+    /// Whether all that an export has beside words is one column that counts in even steps: its readings may be words, such as
+    /// numbers with units.
+    pub(super) fn is_counter_of_words(&self) -> bool {
+        let (Format::Columns(columns), Some(skipped)) = (&self.format, &self.skipped) else {
+            return false;
+        };
+        matches!(&columns[..], [only] if is_counter(&only.real))
+            && skipped.contains("columns that hold words")
     }
 
     /// Names of all fields.

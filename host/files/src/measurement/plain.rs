@@ -198,7 +198,7 @@ fn numbers_of(
 ) -> Result<Numbers, FileError> {
     let path = &fields.path().to_owned();
     let want = &*called(&mut fields, want)?;
-    let name = readings_field(&fields, want)?;
+    let name = readings_field(&mut fields, want)?;
     let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
     let paired = make_pairs(&mut fields, &name, want)?;
     let is_paired = paired.is_some() || two_fields(&fields, &name).is_some();

@@ -176,7 +176,7 @@ fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
             // A number with a comma is one with a decimal comma.
             let is_number = |word: &str| {
                 let decimal = if word.contains(',') { ',' } else { '.' };
-                !word.is_empty() && parse(word, decimal).is_some()
+                !word.trim_matches('"').is_empty() && parse(word, decimal).is_some()
             };
             let mut cells = cells(line, between);
             let mut count = 0;
@@ -205,22 +205,26 @@ fn heading<'t>(
     number: impl Fn(&str) -> Option<f64>,
 ) -> (Option<Vec<&'t str>>, bool) {
     let last = numeric.last().copied().unwrap_or(0);
+    let is_blank = |word: &str| word.trim_matches('"').is_empty();
     let words = |(_, line): &Line<'t>| {
         let cells: Vec<&str> = cells(line, between).collect();
         let are_words = cells.len() > last
-            && numeric.iter().all(|&at| cells[at].is_empty() || number(cells[at]).is_none())
-            && numeric.iter().any(|&at| !cells[at].is_empty());
+            && numeric.iter().all(|&at| is_blank(cells[at]) || number(cells[at]).is_none())
+            && numeric.iter().any(|&at| !is_blank(cells[at]));
         are_words.then_some(cells)
     };
     let is_unit = |word: &str| {
         let plain = word.trim_matches(['(', ')', '[', ']', '"', ' ']);
         UNITS.contains(&plain.to_lowercase().as_str())
     };
-    let mut above = before.iter().rev().map(words);
-    let Some(Some(nearest)) = above.next() else { return (None, false) };
+    let mut above = before.iter().rev();
+    let Some(nearest) = above.next().and_then(words) else { return (None, false) };
     let are_units = numeric.iter().all(|&at| is_unit(nearest[at]));
-    match above.next() {
-        Some(Some(names)) if are_units => (Some(names), true),
+    // Channels above their units may have numbers for names, as `x-axis,1,2`.
+    let names = above.next().map(|(_, line)| cells(line, between).collect::<Vec<&str>>());
+    let is_name = |names: &Vec<&str>| names.len() > last && number(names[numeric[0]]).is_none();
+    match names.filter(is_name) {
+        Some(names) if are_units => (Some(names), true),
         _ => (Some(nearest), false),
     }
 }
@@ -303,6 +307,24 @@ mod tests {
         );
         let (found, _) = columns(&text);
         assert!(found[1].0 == "Channel A" && found[1].1[0] >= 9.9e37 && found[1].1[1] == 8.5);
+    }
+
+    #[test]
+    fn headings_of_more_programs_are_read() {
+        let y = |k: u32| 8.5 - f64::from(k);
+        let k = f64::from;
+        // Channels that have numbers for names, above their units.
+        let text = format!("x-axis,1,2\nsecond,Volt,Volt\n{}", rows(|k| format!("{k},{},5", y(k))));
+        let (found, _) = columns(&text);
+        assert_eq!(found, [expected("x-axis", k), expected("1", y), expected("2", |_| 5.0)]);
+        // R quotes its names, of which the first is empty.
+        let text = format!("\"\",\"y\"\n{}", rows(|k| format!("\"{k}\",{}", y(k))));
+        assert_eq!(columns(&text).0, [expected("", k), expected("y", y)]);
+        // Two columns of one name.
+        let text = format!("y,y\n{}", rows(|k| format!("{},{k}", y(k))));
+        let (found, told) = columns(&text);
+        assert_eq!(found, [expected("y", y), expected("y.1", k)]);
+        assert_eq!(told, "another column is called `y`, too: here `y.1`");
     }
 
     #[test]
