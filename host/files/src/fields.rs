@@ -108,23 +108,17 @@ impl Fields {
         if decimal_comma && !is_of_text {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
+        Ok(Self { skipped, is_text, is_wav, ..Self::of_format(path, names, format) })
+    }
+
+    fn of_format(path: &Path, names: Vec<String>, format: Format) -> Self {
         let (path, made, called) = (path.to_owned(), Vec::new(), Vec::new());
-        Ok(Self { path, names, format, made, called, skipped, is_text, is_wav })
+        Self { path, names, format, made, called, skipped: None, is_text: false, is_wav: false }
     }
 
     /// One array without a name that was made of the file at `path`.
     pub(super) fn of_array(path: &Path, field: Field) -> Self {
-        let (names, made) = (Vec::new(), Vec::new());
-        Self {
-            path: path.to_owned(),
-            names,
-            format: Format::Unnamed(field),
-            made,
-            called: Vec::new(),
-            skipped: None,
-            is_text: false,
-            is_wav: false,
-        }
+        Self::of_format(path, Vec::new(), Format::Unnamed(field))
     }
 
     /// The same file again, without what was made of its fields. A text is not parsed again.
@@ -134,10 +128,9 @@ impl Fields {
             Format::Unnamed(field) => Format::Unnamed(field.clone()),
             _ => return Self::open(&self.path, false),
         };
-        let (path, names) = (self.path.clone(), self.names.clone());
         let (skipped, is_text, is_wav) = (self.skipped.clone(), self.is_text, self.is_wav);
-        let (made, called) = (Vec::new(), Vec::new());
-        Ok(Self { path, names, format, made, called, skipped, is_text, is_wav })
+        let again = Self::of_format(&self.path, self.names.clone(), format);
+        Ok(Self { skipped, is_text, is_wav, ..again })
     }
 
     /// The format, in a few words.
@@ -166,10 +159,7 @@ impl Fields {
     /// The fields of no file, which `path` names in messages.
     pub(super) fn of_fields(path: &Path, fields: Vec<(String, Field)>) -> Self {
         let (names, fields) = fields.into_iter().unzip();
-        let (made, called) = (Vec::new(), Vec::new());
-        let format = Format::Columns(fields);
-        let (path, skipped, is_text, is_wav) = (path.to_owned(), None, false, false);
-        Self { path, names, format, made, called, skipped, is_text, is_wav }
+        Self::of_format(path, names, Format::Columns(fields))
     }
 
     /// A field that is one text, if the file is a NumPy archive and has it.
@@ -274,6 +264,19 @@ impl Fields {
         called.map_or_else(|| field.to_owned(), |(_, own)| own.clone())
     }
 
+    /// A field that is in memory as it is in the file.
+    pub(super) fn held(&self, field: &str) -> Option<&Field> {
+        match &self.format {
+            _ if self.made.iter().any(|(name, _)| name == field) => None,
+            Format::Unnamed(held) => Some(held),
+            Format::Columns(columns) => {
+                let own = self.own_name(field);
+                columns.get(self.names.iter().position(|name| *name == own)?)
+            }
+            _ => None,
+        }
+    }
+
     /// Reads a field. `accept` checks the shape; its error is a description of the expected shape.
     pub(super) fn read(
         &mut self,
@@ -281,8 +284,8 @@ impl Fields {
         accept: impl Fn(&[u64]) -> Result<(), String>,
     ) -> Result<Field, FileError> {
         let own = self.own_name(field);
-        let at = self.names.iter().position(|name| *name == own);
         let made = self.made.iter().find(|(name, _)| name == field).map(|(_, made)| made.clone());
+        let held = self.held(field).cloned();
         let loaded = match &mut self.format {
             _ if made.is_some() => made,
             Format::Npz(archive) => return archive.field(&own, accept),
@@ -290,8 +293,7 @@ impl Fields {
             Format::Mat4(mat) => return mat.read(&own, accept),
             #[cfg(feature = "hdf5")]
             Format::Hdf5(file) => return file.read(&own, accept),
-            Format::Columns(fields) => at.and_then(|at| fields.get(at)).cloned(),
-            Format::Unnamed(field) => Some(field.clone()),
+            Format::Columns(_) | Format::Unnamed(_) => held,
         };
         let name = if self.is_unnamed() { UNNAMED } else { field };
         let Some(loaded) = loaded else {

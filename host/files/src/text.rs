@@ -50,7 +50,9 @@ pub(super) fn is_start(start: &[u8]) -> bool {
     const BEGIN: &[u8] = b"#+-.\"%_,;([{";
     !text.is_empty() && text.iter().all(|&b| b >= b' ' && b != 0x7f || b"\t\r\n".contains(&b)) && {
         let first = text.iter().position(|b| !b.is_ascii_whitespace());
-        first.is_some_and(|at| text[at].is_ascii_alphanumeric() || BEGIN.contains(&text[at]))
+        first.is_some_and(|at| {
+            text[at].is_ascii_alphanumeric() || text[at] >= 0xa0 || BEGIN.contains(&text[at])
+        })
     }
 }
 
@@ -211,7 +213,7 @@ fn plain(path: &Path, lines: &Lines<'_>, decimal_comma: bool) -> Result<Numbers,
     Ok(match names.filter(|names| names.len() == width) {
         Some(names) => Numbers::Columns(
             names
-                .into_iter()
+                .into_par_iter()
                 .enumerate()
                 .map(|(at, name)| {
                     let real = real.iter().copied().skip(at).step_by(width).collect();
