@@ -46,6 +46,8 @@ pub mod order_table;
 pub mod patterns;
 #[cfg(feature = "pictures")]
 pub mod picture;
+#[cfg(not(target_family = "wasm"))]
+pub mod problem;
 #[cfg(all(feature = "enhance", feature = "pictures", not(target_family = "wasm")))]
 pub mod reconstruct;
 #[cfg(feature = "pictures")]

@@ -31,8 +31,6 @@ pub mod measurement;
 #[cfg(not(target_family = "wasm"))]
 pub mod npy;
 pub mod output;
-#[cfg(not(target_family = "wasm"))]
-pub mod problem;
 pub mod provenance;
 pub mod table;
 #[cfg(not(target_family = "wasm"))]

@@ -126,11 +126,15 @@ impl Text {
 /// A line and its number.
 type Line<'t> = (usize, &'t str);
 
-/// The lines of a text that count, and the text.
+/// The lines of a text that count.
 struct Lines<'t> {
-    text: &'t str,
     lines: Vec<Line<'t>>,
+    /// Which of the marks are in the text.
+    marks: Vec<char>,
 }
+
+/// What may stand between or in numbers.
+const MARKS: [char; 5] = [';', '\t', ',', '.', ' '];
 
 /// Bytes, and lines, that one thread takes at a time.
 const PIECE: usize = 1 << 20;
@@ -148,11 +152,19 @@ impl<'t> Lines<'t> {
             pieces.push(piece);
             rest = after;
         }
-        let found: Vec<(usize, Vec<Line<'t>>)> =
-            pieces.par_iter().map(|piece| lines_of(piece)).collect();
-        let mut lines = Vec::with_capacity(found.iter().map(|(_, lines)| lines.len()).sum());
+        let has = |piece: &str| MARKS.map(|mark| piece.contains(mark));
+        let found: Vec<(usize, Vec<Line<'t>>, [bool; MARKS.len()])> = pieces
+            .par_iter()
+            .map(|piece| {
+                let (count, lines) = lines_of(piece);
+                (count, lines, has(piece))
+            })
+            .collect();
+        let holds = |&at: &usize| found.iter().any(|(_, _, has)| has[at]);
+        let marks = (0..MARKS.len()).filter(holds).map(|at| MARKS[at]).collect();
+        let mut lines = Vec::with_capacity(found.iter().map(|(_, lines, _)| lines.len()).sum());
         let mut before = 0;
-        for (count, found) in found {
+        for (count, found, _) in found {
             lines.extend(found.into_iter().map(|(at, line)| (before + at, line)));
             before += count;
         }
@@ -163,12 +175,12 @@ impl<'t> Lines<'t> {
         if lines.first().is_some_and(is_separator) {
             lines.remove(0);
         }
-        Self { text, lines }
+        Self { lines, marks }
     }
 
     /// Whether one of these lines has this mark.
     fn have(&self, body: &[Line<'_>], mark: char) -> bool {
-        self.text.contains(mark) && body.iter().any(|(_, line)| line.contains(mark))
+        self.marks.contains(&mark) && body.iter().any(|(_, line)| line.contains(mark))
     }
 }
 

@@ -169,9 +169,7 @@ fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
         !word.trim_matches('"').is_empty() && parse(word, decimal).is_some()
     };
     for between in [Some(';'), Some('\t'), Some(','), None] {
-        if let Some(mark) = between
-            && !all.text.contains(mark)
-        {
+        if !all.marks.contains(&between.unwrap_or(' ')) {
             // Lines without the mark are one cell each, whatever the mark is.
             if std::mem::replace(&mut has_whole, true) {
                 continue;
