@@ -44,7 +44,7 @@ impl OwnImages {
     /// # Errors
     /// [`ReconstructError`] if the method needs Hadamard rows.
     pub fn new(method: Method, settings: &MethodSettings) -> Result<Self, ReconstructError> {
-        MatrixSettings::of(method, settings)?;
+        method.matrix_settings(settings)?;
         Ok(Self { settings: settings.clone(), ready: None })
     }
 
@@ -100,7 +100,7 @@ impl Ready {
         let method: Method = settings.method.parse().map_err(unknown)?;
         let strength = settings.strength.map_or_else(Strength::default, Strength::Fixed);
         let base = MethodSettings { strength, ..base.clone() };
-        let of_method = MatrixSettings::of(method, &base)?;
+        let of_method = method.matrix_settings(&base)?;
         let of_method = MatrixSettings { dark: plain.dark, ..of_method };
         let own = OwnMatrix::new(plain.patterns.size, &plain.patterns.select(&plain.places))?;
         Ok(Self {

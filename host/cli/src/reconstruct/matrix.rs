@@ -20,7 +20,7 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
     };
     let refused = |why| Usage(format!("--{why}"));
     let of_method =
-        MatrixSettings::of(args.method.method, &args.method.settings()?).map_err(refused)?;
+        args.method.method.matrix_settings(&args.method.settings()?).map_err(refused)?;
     let all = args.source.index == Some(Index::All);
     let index = if all { None } else { args.source.one()? };
     let request = OwnImage {

@@ -46,7 +46,7 @@ mod problem;
 mod pseudo_inverse;
 mod solvers;
 
-use super::{Method, MethodSettings, Penalty, ReconstructError, Sparsity, Strength};
+use super::Penalty;
 use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
 use crate::{Image, Shape, Size};
@@ -104,30 +104,6 @@ pub struct MatrixSettings {
 }
 
 impl MatrixSettings {
-    /// The settings of a method for a user's own patterns.
-    ///
-    /// # Errors
-    /// [`ReconstructError::NeedsRows`] if the method has none.
-    pub fn of(method: Method, settings: &MethodSettings) -> Result<Self, ReconstructError> {
-        let needs_rows = ReconstructError::NeedsRows { method };
-        let strength = match settings.strength {
-            Strength::Fixed(strength) => Some(strength),
-            Strength::CrossValidated { .. } => None,
-        };
-        let sparsity = match settings.sparsity {
-            Sparsity::Fixed(atoms) => Some(atoms),
-            Sparsity::CrossValidated { .. } | Sparsity::Noise => None,
-        };
-        Ok(Self {
-            basis: settings.basis,
-            atoms: settings.dictionary.as_ref().map(|atoms| atoms.values.to_vec()),
-            strength,
-            sparsity,
-            non_negative: settings.non_negative,
-            ..Self::new(method.with_matrix().ok_or(needs_rows)?)
-        })
-    }
-
     /// Default settings: all values are found from the measurements, in the DCT basis.
     #[must_use]
     pub fn new(method: MatrixMethod) -> Self {
