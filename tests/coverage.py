@@ -31,7 +31,7 @@ PLACES = [
     (
         "order tables, tables of numbers",
         [("nirspi-tests", "all", "mutated_files::order_tables")],
-        ["host/files/src/order_table.rs", "host/files/src/table.rs"],
+        ["host/src/order_table.rs", "host/files/src/table.rs"],
     ),
     (
         "camera descriptions",

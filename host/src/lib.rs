@@ -41,14 +41,18 @@ pub mod imaging;
 #[cfg(not(target_family = "wasm"))]
 pub mod inspect;
 pub mod moving;
+pub mod order_table;
 #[cfg(all(feature = "pictures", not(target_family = "wasm")))]
 pub mod patterns;
 #[cfg(feature = "pictures")]
 pub mod picture;
+#[cfg(not(target_family = "wasm"))]
+pub mod problem;
 #[cfg(all(feature = "enhance", feature = "pictures", not(target_family = "wasm")))]
 pub mod reconstruct;
 #[cfg(feature = "pictures")]
 pub mod scene;
+pub mod settings;
 #[cfg(not(target_family = "wasm"))]
 pub mod source;
 pub mod stage_times;

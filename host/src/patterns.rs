@@ -207,7 +207,7 @@ mod tests {
     use super::*;
     use crate::files::feed::Header;
     use crate::files::image::read_grey;
-    use crate::files::order_table::read_order_table;
+    use crate::order_table::read_order_table;
     use nirspi_recon::Measurements;
     use nirspi_recon::reconstruct::hadamard;
 

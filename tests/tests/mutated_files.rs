@@ -8,10 +8,11 @@
 use nirspi::calibration::KeptCalibration;
 use nirspi::capture::{Calibration, CaptureOptions, capture};
 use nirspi::files::measurement::{self, Selection};
-use nirspi::files::order_table::read_order_table;
 use nirspi::files::table::Table;
-use nirspi::files::{image, npy, problem};
+use nirspi::files::{image, npy};
 use nirspi::identity::CameraIdentity;
+use nirspi::order_table::read_order_table;
+use nirspi::problem;
 use nirspi::recording::{Recording, Target, tally_recording};
 use nirspi::response::Settling;
 use nirspi::session::Session;

@@ -7,7 +7,7 @@ use nirspi::address::CameraAddress;
 use nirspi::devices;
 use nirspi::exposure::{Exposure, Length, Light};
 use nirspi::files::feed::Address as FeedAddress;
-use nirspi::files::order_table::read_order_table;
+use nirspi::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;
 use nirspi_optics::Motion;

@@ -168,7 +168,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let leak = captured.settling.as_ref().map(|s| s.leak(setup.clocks_per_pattern, setup.blanked));
     let leak = leak.transpose()?;
     let raw = times.time("inverse_transform", || seen.plain_transform());
-    let settings = args.method.settings_for(measurements.side().pixels())?;
+    let settings = args.method.settings_for(measurements.side().into())?;
     let image = times.time("reconstruct", || seen.reconstruct(args.method.method, &settings));
     let image = match &args.method.dictionary {
         Some(path) => image.with_context(|| path.display().to_string())?,

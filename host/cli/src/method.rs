@@ -11,7 +11,7 @@ use nirspi_recon::omp::Backend;
 use nirspi_recon::reconstruct::{
     self, Method, MethodSettings, ReconstructError, Sparsity, Strength,
 };
-use nirspi_recon::{Basis, Sampling};
+use nirspi_recon::{Basis, Sampling, Size};
 use std::path::PathBuf;
 
 /// How to make the image.
@@ -104,7 +104,7 @@ impl MethodArgs {
     }
 
     /// The requested settings, without a user's own atoms.
-    fn settings(&self) -> Result<MethodSettings> {
+    pub fn settings(&self) -> Result<MethodSettings> {
         Ok(MethodSettings {
             basis: self.basis()?,
             dictionary: None,
@@ -127,9 +127,10 @@ impl MethodArgs {
         }
     }
 
-    /// The requested settings for images of this side. Reads the user's files.
-    pub fn settings_for(&self, side: usize) -> Result<MethodSettings> {
-        let read = |path: &PathBuf| anyhow::Ok(own_atoms(path, read_atoms(path, (side, side))?));
+    /// The requested settings for images of this size. Reads the user's files.
+    pub fn settings_for(&self, size: Size) -> Result<MethodSettings> {
+        let size = (size.height(), size.width());
+        let read = |path: &PathBuf| anyhow::Ok(own_atoms(path, read_atoms(path, size)?));
         let dictionary = self.dictionary.as_ref().map(read).transpose()?;
         Ok(MethodSettings { dictionary, ..self.settings()? })
     }

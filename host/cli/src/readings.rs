@@ -33,7 +33,8 @@ pub struct Args {
     /// Samples of a pattern. With --trigger, the number of samples that must be between two edges
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     samples: Option<u32>,
-    /// The field or column with the trigger's samples. A pattern begins where the trigger rises through the middle of its range
+    /// The field or column with the trigger's samples. A pattern begins where the trigger rises through the middle of its range;
+    /// with NAME:fall where the trigger falls, with NAME:both at every change
     #[arg(long, value_name = "NAME", conflicts_with = "raw")]
     trigger: Option<String>,
     /// Samples before the first pattern, to leave out
@@ -79,7 +80,7 @@ struct Report {
     /// Readings that are not there.
     lost: Vec<usize>,
     overloads: Vec<usize>,
-    /// Samples at which the trigger rises too early.
+    /// Samples with an edge that comes too early.
     extra_edges: Vec<usize>,
     words: Vec<String>,
     notes: Vec<String>,

@@ -13,7 +13,7 @@ use nirspi::files::feed::{Address, Feed};
 use nirspi::files::{interrupt, read_small_text};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_recon::{Sampling, Side};
+use nirspi_recon::{Sampling, Side, Size};
 use nirspi_serve::settings::{MAX_FRAMES, Settings};
 use nirspi_serve::{
     Access, BasePath, CameraSource, Connect, Connected, FeedSource, HostName, Imaging, Server,
@@ -64,6 +64,9 @@ pub struct Args {
     /// Folder for recordings, which the page begins and ends. Without it, the page cannot record
     #[arg(long, value_name = "DIR")]
     record_to: Option<PathBuf>,
+    /// The patterns of a feed that shows its own, as for `nirspi reconstruct --matrix`: docs/feeds.md
+    #[arg(long, value_name = "FILE|DIR|SET")]
+    matrix: Option<PathBuf>,
     /// Newest frames to sum into each image; of a feed, 1 if the option is not given
     #[arg(long, alias = "frames", value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
@@ -116,9 +119,13 @@ impl Args {
     }
 
     /// Methods and networks, and the settings with which the page begins.
-    fn imaging(&self, side: Side, settings: Settings) -> Result<(Imaging, Settings)> {
+    fn imaging(&self, size: Size, settings: Settings) -> Result<(Imaging, Settings)> {
         let method = &self.method;
-        let imaging = Imaging::new(&method.settings_for(side.pixels())?, method.device()?)?;
+        let mut imaging = Imaging::new(&method.settings_for(size)?, method.device()?)?;
+        if self.matrix.is_some() {
+            let refused = |why| Usage(format!("--{why}"));
+            imaging = imaging.of_own_patterns(method.method).map_err(refused)?;
+        }
         let settings =
             Settings { strength: method.strength, warm_start: self.warm_start, ..settings };
         if self.warm_start {
@@ -133,6 +140,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     args.method.check(false)?;
     if let Some(address) = args.camera.feed() {
         return run_feed(args, address);
+    }
+    if args.matrix.is_some() {
+        return Err(Usage("--matrix belongs to --camera feed:ADDR".to_owned()).into());
     }
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
@@ -150,7 +160,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let server = args.server()?;
     let settings = Settings::new(args.method.method, sum, &setup);
-    let (imaging, settings) = args.imaging(Side::INSTRUMENT, settings)?;
+    let (imaging, settings) = args.imaging(Side::INSTRUMENT.into(), settings)?;
     let stop = interrupt::stop_flag();
     let (address, note) = args.camera.address_and_note()?;
     let session = address::open(&address, &args.scene)?;
@@ -172,7 +182,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 /// Shows a feed instead of a camera.
 fn run_feed(args: &Args, address: &Address) -> Result<ExitCode> {
-    const OWN: [&str; 15] = [
+    const OWN: [&str; 16] = [
+        "matrix",
         "listen",
         "token",
         "token-file",
@@ -197,10 +208,12 @@ fn run_feed(args: &Args, address: &Address) -> Result<ExitCode> {
     let feed = Feed::open(address, || !stop.load(Ordering::Relaxed))?;
     // A bench takes longer for a frame than a camera: each frame is an image.
     let sum = if feed::is_given("sum") { args.sum } else { 1 };
-    let source = FeedSource::at(address, feed, args.record_to.clone())
+    let again = (*address != Address::Stdin).then(|| address.clone());
+    let (matrix, record_to) = (args.matrix.clone(), args.record_to.clone());
+    let source = FeedSource::new(address.to_string(), feed, again, matrix, record_to)
         .with_context(|| address.to_string())?;
-    let (imaging, settings) =
-        args.imaging(source.feed.header().hadamard()?.0, source.settings(args.method.method, sum))?;
+    let settings = source.settings(args.method.method, sum);
+    let (imaging, settings) = args.imaging(source.header().size(), settings)?;
     print::line(server.invitation(address))?;
     let served = serve_feed(server, source, imaging, settings, &stop)?;
     print::line(format_args!("stopped: {served}"))?;

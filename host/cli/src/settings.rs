@@ -12,7 +12,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, FromArgMatches};
 use nirspi::causes::in_one_line;
-use nirspi::files::settings::{
+use nirspi::settings::{
     Defaults, Options, Takes, Used, from_environment, from_file, save, variable_of,
 };
 use std::collections::BTreeMap;

@@ -7,16 +7,12 @@
 
 use super::FileError;
 use super::fields::Fields;
-use crate::field::Field;
+use crate::field::{Field, is_counter};
 use crate::measurement::{self, MeasurementFile, Selection};
 use std::path::Path;
 
 /// Most different values of an array that are kept.
 const LEVELS: usize = 3;
-
-/// Share of the mean step by which the steps of evenly spaced numbers may differ: times are often
-/// written with few digits.
-const UNEVEN: f64 = 0.3;
 
 /// An open file.
 pub struct Contents {
@@ -85,13 +81,6 @@ impl Look {
             is_complex: field.imaginary.is_some(),
         }
     }
-}
-
-fn is_counter(numbers: &[f64]) -> bool {
-    let (Some(first), Some(last)) = (numbers.first(), numbers.last()) else { return false };
-    let step = (last - first) / (numbers.len() - 1).max(1) as f64;
-    let even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= UNEVEN * step;
-    numbers.len() > 2 && step > 0.0 && numbers.windows(2).all(even)
 }
 
 /// Least share of the rows of a sweep that a list of rows has.

@@ -6,6 +6,18 @@ use super::array::to_c_order;
 pub(super) const EXPECTED: &str =
     "measurements: .npz, .npy, .mat, .h5, .csv, .txt or .wav, or a recording (.mcap)";
 
+/// Share of the mean step by which the steps of evenly spaced numbers may differ: times are often
+/// written with few digits.
+const UNEVEN: f64 = 0.3;
+
+/// Whether numbers grow in even steps, as times and counters do.
+pub(super) fn is_counter(numbers: &[f64]) -> bool {
+    let (Some(first), Some(last)) = (numbers.first(), numbers.last()) else { return false };
+    let step = (last - first) / (numbers.len() - 1).max(1) as f64;
+    let even = |pair: &[f64]| (pair[1] - pair[0] - step).abs() <= UNEVEN * step;
+    numbers.len() > 2 && step > 0.0 && numbers.windows(2).all(even)
+}
+
 /// Numbers in C order, real or complex.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Field {
@@ -16,6 +28,15 @@ pub(super) struct Field {
 }
 
 impl Field {
+    /// The columns of a table of this width, each with its number from 1 on.
+    pub(super) fn columns(&self, width: usize) -> Vec<(String, Self)> {
+        let column = |at: usize| {
+            let real: Vec<f64> = self.real.iter().copied().skip(at).step_by(width).collect();
+            ((at + 1).to_string(), Self { shape: vec![real.len()], real, imaginary: None })
+        };
+        (0..width).map(column).collect()
+    }
+
     /// A field of numbers that are stored with the first axis fastest. The axes are reversed and
     /// the numbers keep their order.
     pub(super) fn from_column_major(

@@ -6,7 +6,7 @@
 
 use super::FileError;
 use super::archive::Archive;
-use super::field::{EXPECTED, Field};
+use super::field::{EXPECTED, Field, is_counter};
 #[cfg(feature = "hdf5")]
 use super::hdf5::Hdf5;
 use super::mat::Mat;
@@ -27,6 +27,9 @@ const START_BYTES: u64 = 520;
 const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// The largest `.mat` or HDF5 file taken into memory.
 const MAX_FILE_BYTES: u64 = 1 << 30;
+
+/// Fewest lines of a table whose columns may count.
+const FEWEST: usize = 8;
 
 /// An open file.
 pub(super) struct Fields {
@@ -105,23 +108,17 @@ impl Fields {
         if decimal_comma && !is_of_text {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
+        Ok(Self { skipped, is_text, is_wav, ..Self::of_format(path, names, format) })
+    }
+
+    fn of_format(path: &Path, names: Vec<String>, format: Format) -> Self {
         let (path, made, called) = (path.to_owned(), Vec::new(), Vec::new());
-        Ok(Self { path, names, format, made, called, skipped, is_text, is_wav })
+        Self { path, names, format, made, called, skipped: None, is_text: false, is_wav: false }
     }
 
     /// One array without a name that was made of the file at `path`.
     pub(super) fn of_array(path: &Path, field: Field) -> Self {
-        let (names, made) = (Vec::new(), Vec::new());
-        Self {
-            path: path.to_owned(),
-            names,
-            format: Format::Unnamed(field),
-            made,
-            called: Vec::new(),
-            skipped: None,
-            is_text: false,
-            is_wav: false,
-        }
+        Self::of_format(path, Vec::new(), Format::Unnamed(field))
     }
 
     /// The same file again, without what was made of its fields. A text is not parsed again.
@@ -131,10 +128,9 @@ impl Fields {
             Format::Unnamed(field) => Format::Unnamed(field.clone()),
             _ => return Self::open(&self.path, false),
         };
-        let (path, names) = (self.path.clone(), self.names.clone());
         let (skipped, is_text, is_wav) = (self.skipped.clone(), self.is_text, self.is_wav);
-        let (made, called) = (Vec::new(), Vec::new());
-        Ok(Self { path, names, format, made, called, skipped, is_text, is_wav })
+        let again = Self::of_format(&self.path, self.names.clone(), format);
+        Ok(Self { skipped, is_text, is_wav, ..again })
     }
 
     /// The format, in a few words.
@@ -163,10 +159,7 @@ impl Fields {
     /// The fields of no file, which `path` names in messages.
     pub(super) fn of_fields(path: &Path, fields: Vec<(String, Field)>) -> Self {
         let (names, fields) = fields.into_iter().unzip();
-        let (made, called) = (Vec::new(), Vec::new());
-        let format = Format::Columns(fields);
-        let (path, skipped, is_text, is_wav) = (path.to_owned(), None, false, false);
-        Self { path, names, format, made, called, skipped, is_text, is_wav }
+        Self::of_format(path, names, Format::Columns(fields))
     }
 
     /// A field that is one text, if the file is a NumPy archive and has it.
@@ -189,6 +182,49 @@ impl Fields {
     /// What a text has beside its table and is left out, in one line.
     pub(super) fn skipped(&self) -> Option<&str> {
         self.skipped.as_deref()
+    }
+
+    /// Adds a note to what is told of a text.
+    pub(super) fn note(&mut self, note: String) {
+        let before = self.skipped.take().map(|skipped| skipped + "; ").unwrap_or_default();
+        self.skipped = Some(before + &note);
+    }
+
+    /// The only column of a text that does not count in even steps, as times and numbers of lines do: its name, if columns
+    /// have names. That the others are left out is told. `None` if there is no such column, or no other.
+    pub(super) fn column_beside_counters(&mut self) -> Option<String> {
+        let named: Vec<(String, Field)> = match &self.format {
+            Format::Columns(columns) => {
+                self.names.iter().cloned().zip(columns.iter().cloned()).collect()
+            }
+            Format::Unnamed(table) if self.is_text => match table.shape[..] {
+                [lines, width] if lines >= FEWEST && width > 1 => table.columns(width),
+                _ => return None,
+            },
+            _ => return None,
+        };
+        let (counters, others): (Vec<_>, Vec<_>) =
+            named.into_iter().partition(|(_, column)| is_counter(&column.real));
+        let [(only, column)] = &others[..] else { return None };
+        if counters.is_empty() {
+            return None;
+        }
+        let names: Vec<String> = counters.iter().map(|(name, _)| format!("`{name}`")).collect();
+        self.note(format!("left out: columns that count in even steps: {}", names.join(", ")));
+        if self.is_unnamed() {
+            self.format = Format::Unnamed(column.clone());
+        }
+        Some(only.clone())
+    }
+
+    /// Whether all that an export has beside words is one column that counts in even steps: its readings may be words, such as
+    /// numbers with units.
+    pub(super) fn is_counter_of_words(&self) -> bool {
+        let (Format::Columns(columns), Some(skipped)) = (&self.format, &self.skipped) else {
+            return false;
+        };
+        matches!(&columns[..], [only] if is_counter(&only.real))
+            && skipped.contains("columns that hold words")
     }
 
     /// Names of all fields.
@@ -228,6 +264,19 @@ impl Fields {
         called.map_or_else(|| field.to_owned(), |(_, own)| own.clone())
     }
 
+    /// A field that is in memory as it is in the file.
+    pub(super) fn held(&self, field: &str) -> Option<&Field> {
+        match &self.format {
+            _ if self.made.iter().any(|(name, _)| name == field) => None,
+            Format::Unnamed(held) => Some(held),
+            Format::Columns(columns) => {
+                let own = self.own_name(field);
+                columns.get(self.names.iter().position(|name| *name == own)?)
+            }
+            _ => None,
+        }
+    }
+
     /// Reads a field. `accept` checks the shape; its error is a description of the expected shape.
     pub(super) fn read(
         &mut self,
@@ -235,8 +284,8 @@ impl Fields {
         accept: impl Fn(&[u64]) -> Result<(), String>,
     ) -> Result<Field, FileError> {
         let own = self.own_name(field);
-        let at = self.names.iter().position(|name| *name == own);
         let made = self.made.iter().find(|(name, _)| name == field).map(|(_, made)| made.clone());
+        let held = self.held(field).cloned();
         let loaded = match &mut self.format {
             _ if made.is_some() => made,
             Format::Npz(archive) => return archive.field(&own, accept),
@@ -244,8 +293,7 @@ impl Fields {
             Format::Mat4(mat) => return mat.read(&own, accept),
             #[cfg(feature = "hdf5")]
             Format::Hdf5(file) => return file.read(&own, accept),
-            Format::Columns(fields) => at.and_then(|at| fields.get(at)).cloned(),
-            Format::Unnamed(field) => Some(field.clone()),
+            Format::Columns(_) | Format::Unnamed(_) => held,
         };
         let name = if self.is_unnamed() { UNNAMED } else { field };
         let Some(loaded) = loaded else {

@@ -30,12 +30,8 @@ pub mod interrupt;
 pub mod measurement;
 #[cfg(not(target_family = "wasm"))]
 pub mod npy;
-pub mod order_table;
 pub mod output;
-#[cfg(not(target_family = "wasm"))]
-pub mod problem;
 pub mod provenance;
-pub mod settings;
 pub mod table;
 #[cfg(not(target_family = "wasm"))]
 pub mod trace;

@@ -59,7 +59,7 @@ use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
 pub(crate) use opened::{is_reading, read_simulated};
 pub use patterns::{PatternSelection, Patterns};
-pub use plain::{read_plain, read_plain_all};
+pub use plain::{PlainSweeps, read_plain, read_plain_all};
 use rayon::prelude::*;
 pub use remedy::Remedy;
 pub use stack::Stack;

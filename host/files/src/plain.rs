@@ -208,9 +208,16 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         (b"\x0f\x0f:WFM", "a waveform file of Tektronix (.wfm; save it as CSV)"),
         (b"\xf0\xf0:WFM", "a waveform file of Tektronix (.wfm; save it as CSV)"),
         (b"\xd0\xcf\x11\xe0", "an old workbook of Excel (.xls; save it as CSV)"),
-        (b"\x80\x04", "a pickle of Python (save its array with NumPy)"),
-        (b"\x80\x05", "a pickle of Python (save its array with NumPy)"),
+        (b"\xa5\xa5", "a waveform file (.wfm; save it as CSV)"),
     ];
+    match start {
+        [0x80, 2, 0x8a, b'\n', ..] => return "tensors of PyTorch (save the array with NumPy)",
+        [0x80, 2..=5, ..] => return "a pickle of Python (save its array with NumPy)",
+        _ if start.windows(8).any(|word| word == b"WAVEDESC") => {
+            return "a waveform file of LeCroy (.trc; save it as CSV)";
+        }
+        _ => {}
+    }
     KINDS
         .iter()
         .find(|(magic, _)| start.starts_with(magic))
@@ -269,6 +276,19 @@ mod tests {
                 prop_assert_eq!(&read_large_text(&path, "text").unwrap(), &text);
                 prop_assert_eq!(&read_small_text(&path).unwrap(), &text);
             }
+        }
+    }
+
+    #[test]
+    fn files_of_other_programs_are_named_with_what_to_do() {
+        for (start, kind) in [
+            (&b"\x80\x02\x8a\nl\xfc\x9cF"[..], "tensors of PyTorch (save the array with NumPy)"),
+            (b"\x80\x03cnumpy", "a pickle of Python (save its array with NumPy)"),
+            (b"#9000001024WAVEDESC", "a waveform file of LeCroy (.trc; save it as CSV)"),
+            (b"\xa5\xa5\xa4\x01", "a waveform file (.wfm; save it as CSV)"),
+            (b"\x80\x01", "a file of another kind"),
+        ] {
+            assert_eq!(kind_by_start(start), kind);
         }
     }
 

@@ -18,11 +18,12 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Words for a reading that was not taken.
-const UNREAD: [&str; 10] =
-    ["nan", "null", "na", "none", "#n/a", "n/a", "#num!", "-1.#ind", "1.#qnan", "-nan"];
+const UNREAD: [&str; 12] = [
+    "nan", "null", "na", "none", "#n/a", "n/a", "#num!", "-1.#ind", "1.#qnan", "-nan", "--", "---",
+];
 
 /// Words for a reading beyond what an instrument measures.
-const OVERLOADED: [&str; 5] = ["∞", "+∞", "ol", "ovld", "overload"];
+const OVERLOADED: [&str; 7] = ["∞", "+∞", "ol", "o.l", "o.l.", "ovld", "overload"];
 
 /// What instruments write themselves for such a reading.
 const OVERLOAD: f64 = 9.9e37;
@@ -46,10 +47,12 @@ pub(super) enum Numbers {
 pub(super) fn is_start(start: &[u8]) -> bool {
     let text = &*start_of_text(start);
     // Beside letters and digits; pandas leaves the name of its first column empty.
-    const BEGIN: &[u8] = b"#+-.\"%_,;([";
+    const BEGIN: &[u8] = b"#+-.\"%_,;([{";
     !text.is_empty() && text.iter().all(|&b| b >= b' ' && b != 0x7f || b"\t\r\n".contains(&b)) && {
         let first = text.iter().position(|b| !b.is_ascii_whitespace());
-        first.is_some_and(|at| text[at].is_ascii_alphanumeric() || BEGIN.contains(&text[at]))
+        first.is_some_and(|at| {
+            text[at].is_ascii_alphanumeric() || text[at] >= 0xa0 || BEGIN.contains(&text[at])
+        })
     }
 }
 
@@ -63,9 +66,10 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Text, FileError> 
 fn read_str(path: &Path, text: String, decimal_comma: bool) -> Result<Text, FileError> {
     // Lines that end as on an old Macintosh.
     let text = if text.contains('\n') { text } else { text.replace('\r', "\n") };
+    let text = listed(&text).unwrap_or(text);
     let lines = Lines::of(&text);
     let refused = match plain(path, &lines, decimal_comma) {
-        Ok(numbers) => return Ok(Text { numbers, skipped: None }),
+        Ok(numbers) => return Ok(Text::new(numbers, None)),
         Err(error) => error,
     };
     let Some(found) = export::find(path, &lines, decimal_comma) else { return Err(refused) };
@@ -79,17 +83,58 @@ fn read_str(path: &Path, text: String, decimal_comma: bool) -> Result<Text, File
             Numbers::Table(Field { shape: vec![height, width], real, imaginary: None })
         }
     };
-    Ok(Text { numbers, skipped })
+    Ok(Text::new(numbers, skipped))
+}
+
+/// The rows of a list in brackets, as Python prints it and the Red Pitaya sends it: brackets within the outer ones hold a row
+/// each, and ends of lines mean nothing.
+fn listed(text: &str) -> Option<String> {
+    let text = text.trim();
+    let [open, close] = ["[]", "{}", "()"]
+        .map(|kind| [&kind[..1], &kind[1..]])
+        .into_iter()
+        .find(|kind| text.starts_with(kind[0]))?;
+    let inner = text.strip_prefix(open)?.strip_suffix(close)?;
+    let row = |row: &str| {
+        let row = row.replace(open, " ").replace(['\r', '\n'], " ");
+        let row = row.trim().trim_start_matches(',').trim().to_owned();
+        Some(row).filter(|row| !row.is_empty())
+    };
+    Some(inner.split(close).filter_map(row).collect::<Vec<String>>().join("\n"))
+}
+
+impl Text {
+    /// Columns of one name get numbers, as pandas gives them, and a note.
+    fn new(mut numbers: Numbers, skipped: Option<String>) -> Self {
+        let mut notes: Vec<String> = skipped.into_iter().collect();
+        if let Numbers::Columns(columns) = &mut numbers {
+            for at in 1..columns.len() {
+                let name = columns[at].0.clone();
+                let before = columns[..at].iter().filter(|(other, _)| *other == name).count();
+                if before > 0 && !name.is_empty() {
+                    columns[at].0 = format!("{name}.{before}");
+                    notes.push(format!(
+                        "another column is called `{name}`, too: here `{name}.{before}`"
+                    ));
+                }
+            }
+        }
+        Self { numbers, skipped: (!notes.is_empty()).then(|| notes.join("; ")) }
+    }
 }
 
 /// A line and its number.
 type Line<'t> = (usize, &'t str);
 
-/// The lines of a text that count, and the text.
+/// The lines of a text that count.
 struct Lines<'t> {
-    text: &'t str,
     lines: Vec<Line<'t>>,
+    /// Which of the marks are in the text.
+    marks: Vec<char>,
 }
+
+/// What may stand between or in numbers.
+const MARKS: [char; 5] = [';', '\t', ',', '.', ' '];
 
 /// Bytes, and lines, that one thread takes at a time.
 const PIECE: usize = 1 << 20;
@@ -107,11 +152,19 @@ impl<'t> Lines<'t> {
             pieces.push(piece);
             rest = after;
         }
-        let found: Vec<(usize, Vec<Line<'t>>)> =
-            pieces.par_iter().map(|piece| lines_of(piece)).collect();
-        let mut lines = Vec::with_capacity(found.iter().map(|(_, lines)| lines.len()).sum());
+        let has = |piece: &str| MARKS.map(|mark| piece.contains(mark));
+        let found: Vec<(usize, Vec<Line<'t>>, [bool; MARKS.len()])> = pieces
+            .par_iter()
+            .map(|piece| {
+                let (count, lines) = lines_of(piece);
+                (count, lines, has(piece))
+            })
+            .collect();
+        let holds = |&at: &usize| found.iter().any(|(_, _, has)| has[at]);
+        let marks = (0..MARKS.len()).filter(holds).map(|at| MARKS[at]).collect();
+        let mut lines = Vec::with_capacity(found.iter().map(|(_, lines, _)| lines.len()).sum());
         let mut before = 0;
-        for (count, found) in found {
+        for (count, found, _) in found {
             lines.extend(found.into_iter().map(|(at, line)| (before + at, line)));
             before += count;
         }
@@ -122,12 +175,12 @@ impl<'t> Lines<'t> {
         if lines.first().is_some_and(is_separator) {
             lines.remove(0);
         }
-        Self { text, lines }
+        Self { lines, marks }
     }
 
     /// Whether one of these lines has this mark.
     fn have(&self, body: &[Line<'_>], mark: char) -> bool {
-        self.text.contains(mark) && body.iter().any(|(_, line)| line.contains(mark))
+        self.marks.contains(&mark) && body.iter().any(|(_, line)| line.contains(mark))
     }
 }
 
@@ -172,7 +225,7 @@ fn plain(path: &Path, lines: &Lines<'_>, decimal_comma: bool) -> Result<Numbers,
     Ok(match names.filter(|names| names.len() == width) {
         Some(names) => Numbers::Columns(
             names
-                .into_iter()
+                .into_par_iter()
                 .enumerate()
                 .map(|(at, name)| {
                     let real = real.iter().copied().skip(at).step_by(width).collect();

@@ -17,7 +17,7 @@ use series::{Series, Shape};
 use std::ops::Range;
 use std::path::Path;
 use sums::Sums;
-use windows::{Edges, Windows};
+use windows::{Edge, Edges, Windows};
 
 /// The most readings of a trace: 16 000 sweeps of 32 x 32 patterns and their complements.
 const MAX_READINGS: usize = 1 << 25;
@@ -133,7 +133,8 @@ impl std::str::FromStr for Raw {
 pub struct Cut {
     /// The field with the detector's samples; not needed where the file has no other one.
     pub field: Option<String>,
-    /// The field with the trigger's samples, as many: a pattern begins where it rises through the middle of its range.
+    /// The field with the trigger's samples, as many: a pattern begins where it rises through the middle of its range; with
+    /// `NAME:fall` where it falls, with `NAME:both` at both.
     pub trigger: Option<String>,
     /// Samples of a pattern. With a trigger, its edges must show this number.
     pub samples: Option<usize>,
@@ -164,7 +165,7 @@ pub struct Found {
     pub by_trigger: bool,
     /// Readings that are not there: the trigger has no edge, or too few samples follow the edge.
     pub lost: Vec<usize>,
-    /// Samples at which the trigger rises too early to begin a pattern. They are left out.
+    /// Samples with an edge of the trigger that comes too early to begin a pattern. They are left out.
     pub extra: Vec<usize>,
     /// Readings that are not there because a sample is an instrument's word for overload.
     pub overloads: Vec<usize>,
@@ -183,9 +184,9 @@ pub struct First {
     pub samples: Vec<(usize, f64)>,
     /// The samples of each of the first readings; an empty range for a reading that is not there.
     pub windows: Vec<Range<usize>>,
-    /// Where the trigger rises at the beginning of a pattern.
+    /// The edges of the trigger at the beginning of a pattern.
     pub edges: Vec<usize>,
-    /// Where the trigger rises too early.
+    /// The edges that come too early.
     pub extra: Vec<usize>,
 }
 
@@ -196,6 +197,9 @@ pub struct First {
 /// [`FileError`], one line that names file, field, what was found and what was expected.
 pub fn read(path: &Path, cut: &Cut) -> Result<Found, FileError> {
     let mut series = Series::open(path, cut.raw, cut.decimal_comma)?;
+    let (trigger, edge) =
+        cut.trigger.as_deref().map(|trigger| Edge::of(trigger, series.names())).unzip();
+    let cut = &Cut { trigger: trigger.map(str::to_owned), ..cut.clone() };
     let (field, trigger) = fields(path, &series, cut)?;
     let last = cut.samples.filter(|&k| k > 1 && cut.skip == 0 && trigger.is_none());
     let shape = Shape { last };
@@ -209,7 +213,8 @@ pub fn read(path: &Path, cut: &Cut) -> Result<Found, FileError> {
     };
     let (windows, extra, cut_off) = match &trigger {
         Some(name) => {
-            let found = by_trigger(path, &mut series, name, length, cut)?;
+            let found =
+                by_trigger(path, &mut series, (name, edge.unwrap_or(Edge::Rise)), length, cut)?;
             (found.windows, found.extra, found.cut_off)
         }
         None => {
@@ -313,7 +318,7 @@ fn fields(path: &Path, series: &Series, cut: &Cut) -> Result<(String, Option<Str
 fn by_trigger(
     path: &Path,
     series: &mut Series,
-    name: &str,
+    (name, edge): (&str, Edge),
     length: usize,
     cut: &Cut,
 ) -> Result<windows::Cut, FileError> {
@@ -338,19 +343,22 @@ fn by_trigger(
     if let Some((at, level)) = wrong {
         return refuse(format!("is {level} at [{at}]"), "finite numbers");
     }
-    let mut edges = Edges::new(range, cut.skip, MAX_READINGS);
+    let mut edges = Edges::new(edge, range, cut.skip, MAX_READINGS);
     series.each_block(name, shape, &mut |block| edges.take(block))?;
     let found = edges.count();
     if found > MAX_READINGS {
-        return refuse(format!("rises more than {MAX_READINGS} times"), "fewer edges");
+        return refuse(format!("{} more than {MAX_READINGS} times", edge.verb()), "fewer edges");
     }
     let Some(found) = edges.cut(cut.settle) else {
         let times = if found == 1 { "once" } else { "nowhere" };
-        return refuse(format!("rises {times}"), "two edges or more: one for each pattern");
+        return refuse(
+            format!("{} {times}", edge.verb()),
+            "two edges or more: one for each pattern",
+        );
     };
     match (cut.samples, found.windows.samples) {
         (Some(asked), samples) if asked != samples => {
-            refuse(format!("rises every {samples} samples"), &format!("{asked}"))
+            refuse(format!("{} every {samples} samples", edge.verb()), &format!("{asked}"))
         }
         _ => Ok(found),
     }

@@ -315,6 +315,7 @@ struct Wanted {
     strength: Option<f64>,
     sum: u32,
     record_to: Option<PathBuf>,
+    matrix: Option<PathBuf>,
     device: String,
 }
 
@@ -352,7 +353,6 @@ impl FeedPage {
         if let Some(folder) = wanted.record_to.as_ref().filter(|folder| !folder.is_dir()) {
             return Err(refused(format!("record_to {}: found no such folder", folder.display())));
         }
-        feed.header.hadamard().map_err(refusal)?;
         let method = word_of_method(&wanted.method)?;
         let (computes, device) = backend(&wanted.device)?;
         let settings = MethodSettings {
@@ -361,7 +361,18 @@ impl FeedPage {
             backend: computes,
             ..MethodSettings::default()
         };
-        let imaging = long(py, |_| Imaging::new(&settings, device).map_err(refusal))?;
+        let own = wanted.matrix.is_some();
+        if !own {
+            feed.header.hadamard().map_err(refusal)?;
+        }
+        let imaging = long(py, |_| {
+            let imaging = Imaging::new(&settings, device);
+            let imaging = match own {
+                true => imaging.and_then(|imaging| imaging.of_own_patterns(method)),
+                false => imaging,
+            };
+            imaging.map_err(refusal)
+        })?;
         let server = Server::bind(&wanted.listen, access, &made(py)?).map_err(|error| {
             let (listen, why) = (&wanted.listen, in_one_line(&error));
             PyOSError::new_err(format!("listen {listen}: cannot listen there: {why}"))
@@ -369,12 +380,9 @@ impl FeedPage {
         let Some(readings) = lock(&feed.readings).take() else {
             return Err(refused("the feed is closed, open it again"));
         };
-        let source = FeedSource {
-            name: feed.name.clone(),
-            feed: readings,
-            again: feed.again.clone(),
-            record_to: wanted.record_to,
-        };
+        let (name, again) = (feed.name.clone(), feed.again.clone());
+        let source = FeedSource::new(name, readings, again, wanted.matrix, wanted.record_to);
+        let source = source.map_err(refusal)?;
         let settings =
             Settings { strength: wanted.strength, ..source.settings(method, wanted.sum) };
         let (url, stop) = (server.url(), Arc::new(AtomicBool::new(false)));

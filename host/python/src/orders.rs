@@ -2,7 +2,7 @@
 
 use crate::arrays::{array, side};
 use crate::errors::{of_file, refusal, refused};
-use nirspi::files::order_table::read_order_table;
+use nirspi::order_table::read_order_table;
 use nirspi_recon::Order;
 use numpy::PyArray1;
 use pyo3::prelude::*;

@@ -176,6 +176,13 @@ def test_patterns_of_ones_own_give_readings_for_a_matrix(tmp_path):
             ns.serve(feed, listen="127.0.0.1:0", wait=False)
         feed.record(tmp_path / "rec.npz")
     assert np.array_equal(np.load(tmp_path / "rec.npz")["y"], [y])
+    np.save(tmp_path / "masks.npy", masks)
+    shown = {"matrix": tmp_path / "masks.npy", "method": "pseudo-inverse", "listen": "127.0.0.1:0", "wait": False}
+    with ns.serve([y], size=(4, 6), patterns=60, readings="single", **shown) as page:
+        state(page.url, lambda state: state["picture"])
+        assert np.allclose(np.load(io.BytesIO(get(page.url, "/image.npy"))), scene, atol=1e-4)
+    with pytest.raises(ns.Error, match="method hadamard needs Hadamard rows"):
+        ns.serve([y], size=(4, 6), patterns=60, readings="single", **shown | {"method": "hadamard"})
 
 
 def test_a_recording_is_opened_by_load(tmp_path):

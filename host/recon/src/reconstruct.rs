@@ -55,7 +55,8 @@ pub use methods::hadamard;
 pub use noise::estimated_noise;
 pub use own_atoms::omp_over;
 pub use own_matrix::{
-    DarkLevel, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix,
+    DarkLevel, LiveMatrix, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings,
+    OwnMatrix,
 };
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
@@ -274,6 +275,15 @@ pub enum ReconstructError {
     NotTaken {
         /// The setting.
         setting: Setting,
+        /// The method.
+        method: Method,
+    },
+    /// The method needs Hadamard rows, and the patterns are others.
+    #[error(
+        "method {method} needs Hadamard rows, and these patterns are others: expected {}",
+        Method::listed(|method| method.with_matrix().is_some())
+    )]
+    NeedsRows {
         /// The method.
         method: Method,
     },

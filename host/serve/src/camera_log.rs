@@ -118,7 +118,10 @@ impl CameraState {
 pub struct FeedState {
     name: Option<String>,
     unit: Option<String>,
-    n: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    n: Option<usize>,
+    height: usize,
+    width: usize,
     order: String,
     patterns: usize,
     readings: &'static str,
@@ -222,7 +225,9 @@ impl CameraLog {
         self.camera.feed = Some(FeedState {
             name: header.name.clone(),
             unit: header.unit.clone(),
-            n: header.size().width(),
+            n: header.hadamard().ok().map(|(side, _)| side.pixels()),
+            height: header.size().height(),
+            width: header.size().width(),
             order: header.order(),
             patterns: header.patterns(),
             readings: header.form.name(),

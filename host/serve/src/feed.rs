@@ -3,17 +3,16 @@
 use super::camera_log::Phase;
 use super::delays::Passed;
 use super::light::Leds;
-use super::look::{Bench, Look, Seen};
+use super::look::{Bench, BenchError, Look, Seen};
 use super::rest::{RETRY, rest};
 use super::settings::{Measuring, Settings};
-use super::{ForeignError, Shared, lock};
+use super::{Shared, lock};
 use nirspi::account::LossCounters;
 use nirspi::causes;
 use nirspi::clock::Instant;
 use nirspi::events::Level;
 use nirspi::files::FileError;
-use nirspi::files::feed::{Account, Address, Feed, Header, Next, OwnPatterns, Recorded, Recorder};
-use nirspi::files::measurement::Sweeps;
+use nirspi::files::feed::{Account, Address, Feed, Header, Next, Recorded, Recorder};
 use nirspi::provenance::Made;
 use nirspi_recon::reconstruct::Method;
 use nirspi_recon::words::count;
@@ -32,34 +31,44 @@ const MOST_KEPT: usize = 256 << 20;
 /// A feed whose header has come.
 pub struct FeedSource {
     /// Where the readings come from, in words.
-    pub name: String,
-    /// The feed.
-    pub feed: Feed,
+    pub(super) name: String,
+    feed: Feed,
+    bench: Arc<Bench>,
     /// The address at which the feed is opened again after its end; `None` for a feed that has no other.
-    pub again: Option<Address>,
+    again: Option<Address>,
+    /// The patterns of a feed that shows its own.
+    matrix: Option<PathBuf>,
     /// The folder for recordings; `None` if pages cannot record.
-    pub record_to: Option<PathBuf>,
+    pub(super) record_to: Option<PathBuf>,
 }
 
 impl FeedSource {
-    /// The feed of an address.
+    /// The feed of this name. After its end, it is opened `again`, unless it has no address. `matrix` is the file of the
+    /// patterns of a feed that shows its own; pages record to the folder `record_to`, if there is one.
     ///
     /// # Errors
-    /// [`OwnPatterns`], which a page cannot show.
-    pub fn at(
-        address: &Address,
+    /// [`BenchError`] if the patterns are not those of the feed.
+    pub fn new(
+        name: String,
         feed: Feed,
+        again: Option<Address>,
+        matrix: Option<PathBuf>,
         record_to: Option<PathBuf>,
-    ) -> Result<Self, OwnPatterns> {
-        feed.header().hadamard()?;
-        let again = (*address != Address::Stdin).then(|| address.clone());
-        Ok(Self { name: address.to_string(), feed, again, record_to })
+    ) -> Result<Self, BenchError> {
+        let bench = Arc::new(Bench::new(&name, feed.header(), matrix.as_deref())?);
+        Ok(Self { name, feed, bench, again, matrix, record_to })
+    }
+
+    /// The header of the feed.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.bench.header
     }
 
     /// The settings with which a page of this feed begins.
     #[must_use]
     pub fn settings(&self, method: Method, frames: u32) -> Settings {
-        let header = self.feed.header();
+        let header = self.header();
         let sampling = (header.patterns() as f64 / header.size().area() as f64).min(1.0);
         let measuring = Measuring { order: header.order(), sampling, sweeps: 1 };
         Settings::measuring(method, frames, measuring)
@@ -67,7 +76,7 @@ impl FeedSource {
 
     /// Receives until the server stops. A feed that has ended is opened again, if there is another.
     pub(super) fn receive(self, shared: &Arc<Shared>, made: &Made) {
-        let Self { name, feed, again, record_to } = self;
+        let Self { name, feed, bench, again, matrix, record_to } = self;
         let mut receiver = Receiver {
             shared,
             name: &name,
@@ -77,7 +86,7 @@ impl FeedSource {
             offered: 0,
             recorder: None,
         };
-        let mut why = receiver.one(feed);
+        let mut why = receiver.one(feed, Ok(bench));
         while !shared.is_over() {
             let Some(address) = &again else {
                 shared.enter(Phase::Lost, Leds::None, why);
@@ -89,7 +98,10 @@ impl FeedSource {
             shared.enter(Phase::Lost, Leds::None, format!("{why}; trying again"));
             rest(shared, RETRY);
             why = match Feed::open(address, || !shared.is_over()) {
-                Ok(feed) => receiver.one(feed),
+                Ok(feed) => {
+                    let bench = Bench::new(&name, feed.header(), matrix.as_deref());
+                    receiver.one(feed, bench.map(Arc::new))
+                }
                 Err(error) => causes::in_one_line(&error),
             };
         }
@@ -111,10 +123,10 @@ struct Receiver<'r> {
 
 impl Receiver<'_> {
     /// Receives a feed to its end. Returns why it ended, in one line.
-    fn one(&mut self, mut feed: Feed) -> String {
-        let why = match self.frames(&mut feed) {
-            Ok(why) => why,
-            Err(error) => causes::in_one_line(&*error),
+    fn one(&mut self, mut feed: Feed, bench: Result<Arc<Bench>, BenchError>) -> String {
+        let why = match bench {
+            Ok(bench) => self.frames(&mut feed, &bench),
+            Err(error) => causes::in_one_line(&error),
         };
         self.end_recording();
         let run = counters(feed.account(), true);
@@ -124,10 +136,9 @@ impl Receiver<'_> {
         why
     }
 
-    fn frames(&mut self, feed: &mut Feed) -> Result<String, ForeignError> {
-        let header = feed.header().clone();
-        let bench = Arc::new(self.bench(&header)?);
-        lock(&self.shared.camera).fed(&header, header.taken(self.name));
+    fn frames(&mut self, feed: &mut Feed, bench: &Arc<Bench>) -> String {
+        let header = &bench.header;
+        lock(&self.shared.camera).fed(header, header.taken(self.name));
         let mut kept: VecDeque<Arc<[f64]>> = VecDeque::new();
         let most = (MOST_KEPT / (8 * header.readings())).max(1);
         let mut told = Instant::now();
@@ -144,7 +155,7 @@ impl Receiver<'_> {
                     while kept.len() > sum.min(most) {
                         kept.pop_front();
                     }
-                    self.offer(&kept, &bench, feed.account());
+                    self.offer(&kept, bench, feed.account());
                     if self.offered == 1 || silent.take().is_some() {
                         self.shared.enter(Phase::Measuring, Leds::None, "measuring".to_owned());
                     }
@@ -161,22 +172,15 @@ impl Receiver<'_> {
                         self.shared.enter(Phase::Measuring, Leds::None, "measuring".to_owned());
                     }
                 }
-                Next::End(end) => return Ok(end.to_string()),
+                Next::End(end) => return end.to_string(),
             }
             if told.elapsed() >= TICK {
                 told = Instant::now();
                 self.tell(feed.account(), counters(feed.account(), false));
-                self.record(&header);
+                self.record(header);
             }
         }
-        Ok("the server stops".to_owned())
-    }
-
-    fn bench(&self, header: &Header) -> Result<Bench, ForeignError> {
-        let origin = PathBuf::from(self.name);
-        let (side, rows) = header.hadamard()?;
-        let sweeps = Sweeps::new(&origin, side, rows, header.form, header.simulated)?;
-        Ok(Bench { header: header.clone(), origin, sweeps })
+        "the server stops".to_owned()
     }
 
     fn offer(&mut self, kept: &VecDeque<Arc<[f64]>>, bench: &Arc<Bench>, account: &Account) {

@@ -264,45 +264,48 @@ async fn next_state(State(app): State<App>, uri: Uri) -> Response {
     (age, [UNBUFFERED], json(moment.message.clone())).into_response()
 }
 
+/// Height and width of the enhanced image.
+const ENHANCED: (usize, usize) = (deblur::SIDE, deblur::SIDE);
+
 async fn image(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    let side = picture.as_ref().map_or(0, |picture| picture.n);
-    png(&app, side, picture.map(|picture| picture.shares_of_white()).as_deref())
+    let size = picture.as_ref().map_or((0, 0), |picture| (picture.height, picture.width));
+    png(&app, size, picture.map(|picture| picture.shares_of_white()).as_deref())
 }
 
 async fn enhanced(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    png(&app, deblur::SIDE, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
+    png(&app, ENHANCED, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
 }
 
 /// ADC counts.
 async fn image_numbers(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    let side = picture.as_ref().map_or(0, |picture| picture.n);
-    numbers(side, picture.as_ref().map(|picture| picture.counts.as_slice()))
+    let size = picture.as_ref().map_or((0, 0), |picture| (picture.height, picture.width));
+    numbers(size, picture.as_ref().map(|picture| picture.counts.as_slice()))
 }
 
 /// Shares of white.
 async fn enhanced_numbers(State(app): State<App>) -> Response {
     let picture = app.published.borrow().picture.clone();
-    numbers(deblur::SIDE, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
+    numbers(ENHANCED, picture.as_ref().and_then(|picture| picture.enhanced.as_deref()))
 }
 
 fn no_image() -> Response {
     line(StatusCode::SERVICE_UNAVAILABLE, &"there is no such image now")
 }
 
-fn png(app: &App, side: usize, pixels: Option<&[f32]>) -> Response {
+fn png(app: &App, (height, width): (usize, usize), pixels: Option<&[f32]>) -> Response {
     let Some(pixels) = pixels else { return no_image() };
     let provenance = lock(&app.shared.camera).camera.taken().made(&app.made);
-    let png = encode_grey(side, side, pixels, &provenance);
+    let png = encode_grey(height, width, pixels, &provenance);
     ([(header::CONTENT_TYPE, "image/png")], png).into_response()
 }
 
-fn numbers(side: usize, pixels: Option<&[f32]>) -> Response {
+fn numbers((height, width): (usize, usize), pixels: Option<&[f32]>) -> Response {
     let Some(pixels) = pixels else { return no_image() };
     let kind = [(header::CONTENT_TYPE, "application/octet-stream")];
-    (kind, npy::encode(&[side, side], pixels)).into_response()
+    (kind, npy::encode(&[height, width], pixels)).into_response()
 }
 
 /// Applies a change, and answers with the new settings.

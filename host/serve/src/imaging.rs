@@ -5,6 +5,8 @@ use super::delays::Passed;
 use super::line::Line;
 use super::look::{Look, Measured, MeasuredError};
 use super::moving::Moving;
+#[cfg(feature = "server")]
+use super::own::OwnImages;
 use super::picture::{Enhancement, Picture};
 use super::settings::{Offer, Settings, alternatives};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
@@ -18,17 +20,19 @@ use nirspi::imaging::{
 };
 use nirspi_nets::deblur::{self, Model};
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
+#[cfg(feature = "server")]
+use nirspi_recon::reconstruct::MatrixError;
 use nirspi_recon::reconstruct::{
     Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Report, Setting,
     Stacked, Strength,
 };
-use nirspi_recon::{Measurements, Side};
+use nirspi_recon::{Image, Measurements, Shape, Side};
 use std::sync::{Arc, Mutex};
 use thiserror::Error;
 
 /// Why the newest frames gave no picture.
 #[derive(Debug, Error)]
-enum PictureError {
+pub(super) enum PictureError {
     /// The settings name a method that does not exist.
     #[error("there is no method {0}")]
     Method(&'static str),
@@ -38,6 +42,10 @@ enum PictureError {
     /// The method gives no image.
     #[error(transparent)]
     Reconstruct(#[from] ReconstructError),
+    /// The patterns of a feed, or a setting, give no image.
+    #[cfg(feature = "server")]
+    #[error(transparent)]
+    Matrix(#[from] MatrixError),
     /// The image has a pixel that is not finite.
     #[error("the frames gave no image of finite numbers")]
     NotFinite,
@@ -78,17 +86,20 @@ pub struct Imaging {
     methods: Vec<Prepared>,
     device: Device,
     models: Vec<Model>,
+    /// Images of patterns of a bench's own, if it shows such.
+    #[cfg(feature = "server")]
+    own: Option<OwnImages>,
     /// The learned stages with the network of this name.
     enhance: (&'static str, Enhance),
 }
 
 /// Number of pictures after which a method that chooses among others chooses again: some seconds of a
 /// live view.
-const CHOSEN_EVERY: u32 = 100;
+pub(super) const CHOSEN_EVERY: u32 = 100;
 
 /// These settings with the strength that a page chose; without one, it is chosen by held-back
 /// measurements.
-fn with_strength(settings: &MethodSettings, strength: Option<f64>) -> MethodSettings {
+pub(super) fn with_strength(settings: &MethodSettings, strength: Option<f64>) -> MethodSettings {
     let strength = strength.map_or_else(Strength::default, Strength::Fixed);
     MethodSettings { strength, ..settings.clone() }
 }
@@ -125,7 +136,38 @@ impl Imaging {
         let models = Model::ALL.into_iter().filter(|model| is_live(model)).collect();
         let model = Network::default().model();
         let enhance = (model.name(), Enhance::by(model.into(), &device)?);
-        Ok(Self { settings: settings.clone(), methods, device, models, enhance })
+        Ok(Self {
+            settings: settings.clone(),
+            methods,
+            device,
+            models,
+            #[cfg(feature = "server")]
+            own: None,
+            enhance,
+        })
+    }
+
+    /// The same for a feed of its own patterns, whose page begins with this method: with the methods for such patterns, and
+    /// without networks, which know Hadamard patterns only.
+    ///
+    /// # Errors
+    /// [`ImagingError::Method`] if this method is none of them.
+    #[cfg(feature = "server")]
+    pub fn of_own_patterns(mut self, method: Method) -> Result<Self, ImagingError> {
+        self.own = Some(OwnImages::new(method, &self.settings)?);
+        let is_ours = |method: Method| method.with_matrix().is_some();
+        self.methods.retain(|prepared| prepared.built_in.is_some_and(|(of, _)| is_ours(of)));
+        self.models.clear();
+        Ok(self)
+    }
+
+    /// Whether images by this method can start from the images before.
+    fn can_remember(&self, prepared: &Prepared) -> bool {
+        #[cfg(feature = "server")]
+        if self.own.is_some() {
+            return false;
+        }
+        matches!(prepared.method.begin_video(), Ok(Some(_)))
     }
 
     /// The same with a method of your own. Pages offer the method by this name.
@@ -140,8 +182,7 @@ impl Imaging {
         let with_strength = |prepared: &&Prepared| {
             prepared.built_in.is_some_and(|(method, _)| method.takes(Setting::Strength))
         };
-        let with_warm_start =
-            |prepared: &&Prepared| matches!(prepared.method.begin_video(), Ok(Some(_)));
+        let with_warm_start = |prepared: &&Prepared| self.can_remember(prepared);
         let about =
             |prepared: &Prepared| prepared.built_in.map_or("", |(method, _)| method.about());
         Offer {
@@ -162,9 +203,10 @@ impl Imaging {
     /// [`ImagingError::Method`] if the method's settings allow no video.
     pub fn check_warm_start(&self, method: &'static str) -> Result<(), ImagingError> {
         let chosen = self.methods.iter().find(|prepared| prepared.name == method);
-        match chosen.map(|prepared| prepared.method.begin_video()).transpose()?.flatten() {
-            Some(_) => Ok(()),
-            None => {
+        chosen.map(|prepared| prepared.method.begin_video()).transpose()?;
+        match chosen.is_some_and(|prepared| self.can_remember(prepared)) {
+            true => Ok(()),
+            false => {
                 let methods = self.offer().with_warm_start;
                 Err(ImagingError::WarmStart { method, methods })
             }
@@ -177,7 +219,7 @@ impl Imaging {
         settings.warm_start
             && all
                 .find(|prepared| prepared.name == settings.method)
-                .is_some_and(|prepared| matches!(prepared.method.begin_video(), Ok(Some(_))))
+                .is_some_and(|prepared| self.can_remember(prepared))
     }
 
     /// The method that these settings choose, prepared for their strength.
@@ -336,8 +378,14 @@ impl Imaging {
         shared: &Shared,
     ) -> Result<Picture, PictureError> {
         let started = Instant::now();
-        let Measured { measurements, warnings: frame_warnings } =
-            look.measured(self.remembers(settings))?;
+        let (measurements, frame_warnings) = match look.measured(self.remembers(settings))? {
+            Measured::Hadamard { measurements, warnings } => (measurements, warnings),
+            #[cfg(feature = "server")]
+            Measured::Own(plain) => {
+                let own = self.own.as_mut().ok_or(PictureError::Method(settings.method))?;
+                return own.picture(&plain, look, settings, white, shared);
+            }
+        };
         let method = self.method(settings)?;
         let made = moving.image(method, &measurements, look, settings)?;
         let flat_field = look.flat_field();
@@ -379,34 +427,59 @@ impl Imaging {
             (enhanced, half_width) = (Some(made.pixels), made.half_width);
             shared.passed(Passed::Enhanced, look.arrived);
         }
-        let (order, patterns, sweeps) = look.patterns();
         Ok(Picture {
-            number: shared.slot.ledger().images.shown + 1,
-            counts: image.pixels().to_vec(),
             enhanced,
             half_width,
-            readings: readings(&measurements),
-            depth: look.depth().cloned(),
-            #[cfg(feature = "server")]
-            arrived: look.arrived,
-            arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed()))
-                .as_millis() as u64,
-            method: settings.method,
-            n: side,
-            unit: look.unit(),
-            order,
-            patterns,
-            sweeps,
-            run_frames: look.counters,
+            n: Some(side),
+            readings: Some(readings(&measurements)),
             past: report.warm.then(|| report.note.unwrap_or_default()),
-            frames: look.frames(),
-            white_counts,
-            reconstruct_ms,
             enhancement,
             warnings: all,
             frame_warnings,
             short_warnings: short,
+            ..made_of(look, settings, shared, &image, white_counts, reconstruct_ms)
         })
+    }
+}
+
+/// The picture of an image, without what networks and Hadamard patterns add.
+pub(super) fn made_of(
+    look: &Look,
+    settings: &Settings,
+    shared: &Shared,
+    image: &Image<impl Shape>,
+    white_counts: f32,
+    reconstruct_ms: f64,
+) -> Picture {
+    let (order, patterns, sweeps) = look.patterns();
+    Picture {
+        number: shared.slot.ledger().images.shown + 1,
+        counts: image.pixels().to_vec(),
+        enhanced: None,
+        half_width: None,
+        readings: None,
+        depth: look.depth().cloned(),
+        #[cfg(feature = "server")]
+        arrived: look.arrived,
+        arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed())).as_millis()
+            as u64,
+        method: settings.method,
+        n: None,
+        height: image.size().height(),
+        width: image.size().width(),
+        unit: look.unit(),
+        order,
+        patterns,
+        sweeps,
+        run_frames: look.counters,
+        past: None,
+        frames: look.frames(),
+        white_counts,
+        reconstruct_ms,
+        enhancement: None,
+        warnings: Vec::new(),
+        frame_warnings: Vec::new(),
+        short_warnings: Vec::new(),
     }
 }
 
@@ -419,6 +492,6 @@ fn readings(measurements: &Measurements) -> Vec<f32> {
     readings
 }
 
-fn ms_since(started: Instant) -> f64 {
+pub(super) fn ms_since(started: Instant) -> f64 {
     started.elapsed().as_secs_f64() * 1e3
 }

@@ -45,6 +45,8 @@ mod look;
 mod moving;
 mod overload;
 #[cfg(feature = "server")]
+mod own;
+#[cfg(feature = "server")]
 mod page;
 #[cfg(feature = "server")]
 mod pages;
@@ -75,6 +77,8 @@ pub use camera::{CameraSource, Connect, Connected};
 pub use feed::FeedSource;
 pub use imaging::{Imaging, ImagingError};
 pub use line::Line;
+#[cfg(feature = "server")]
+pub use look::BenchError;
 #[cfg(feature = "server")]
 pub use server::{BindError, Server};
 pub use slot::{ImageCounters, Ledger};

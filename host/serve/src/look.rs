@@ -4,9 +4,11 @@ use nirspi::account::LossCounters;
 use nirspi::calibration::FlatField;
 use nirspi::clock::Instant;
 #[cfg(feature = "server")]
-use nirspi::files::feed::{Header, mean};
+use nirspi::files::FileError;
 #[cfg(feature = "server")]
-use nirspi::files::measurement::Sweeps;
+use nirspi::files::feed::{Header, OwnPatterns, mean};
+#[cfg(feature = "server")]
+use nirspi::files::measurement::{Plain, PlainSweeps, Sweeps};
 use nirspi::integrate::{IntegrateError, Newest};
 use nirspi::moving::followed;
 use nirspi::response::Settling;
@@ -18,7 +20,7 @@ use nirspi_recon::Measurements;
 #[cfg(feature = "server")]
 use std::fmt;
 #[cfg(feature = "server")]
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -73,7 +75,52 @@ pub struct Bench {
     /// The address, for messages.
     pub origin: PathBuf,
     /// Makes measurements of readings.
-    pub sweeps: Sweeps,
+    sweeps: Shown,
+}
+
+/// What makes measurements of readings.
+#[cfg(feature = "server")]
+enum Shown {
+    /// Of Hadamard patterns.
+    Hadamard(Box<Sweeps>),
+    /// Of patterns of the bench's own.
+    Own(PlainSweeps),
+}
+
+/// Why the frames of a feed cannot be interpreted.
+#[cfg(feature = "server")]
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum BenchError {
+    /// The feed shows patterns of its own, which are not known.
+    #[error(transparent)]
+    OwnPatterns(#[from] OwnPatterns),
+    /// The feed shows Hadamard patterns, and others were given.
+    #[error("the feed shows Hadamard patterns: expected no others beside them (--matrix)")]
+    Hadamard,
+    /// The patterns cannot be read, or do not fit the header.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+#[cfg(feature = "server")]
+impl Bench {
+    /// The feed of this name with this header, and the file of its own patterns, if it shows such.
+    pub fn new(name: &str, header: &Header, matrix: Option<&Path>) -> Result<Self, BenchError> {
+        let (origin, form, simulated) = (PathBuf::from(name), header.form, header.simulated);
+        let sweeps = match (header.hadamard(), matrix) {
+            (Ok(_), Some(_)) => return Err(BenchError::Hadamard),
+            (Ok((side, rows)), None) => {
+                let sweeps = Sweeps::new(&origin, side, rows, form, simulated)?;
+                Shown::Hadamard(Box::new(sweeps))
+            }
+            (Err(unknown), None) => return Err(unknown.into()),
+            (Err(OwnPatterns { size, count }), Some(matrix)) => {
+                Shown::Own(PlainSweeps::new(matrix, (count, size), &origin, form, simulated)?)
+            }
+        };
+        Ok(Self { header: header.clone(), origin, sweeps })
+    }
 }
 
 #[cfg(feature = "server")]
@@ -95,11 +142,17 @@ pub enum Run {
 
 /// What frames have measured.
 #[derive(Debug)]
-pub struct Measured {
-    /// The measurements.
-    pub measurements: Measurements,
-    /// What contradicts them, one line each.
-    pub warnings: Vec<String>,
+pub enum Measured {
+    /// By Hadamard patterns.
+    Hadamard {
+        /// The measurements.
+        measurements: Measurements,
+        /// What contradicts them, one line each.
+        warnings: Vec<String>,
+    },
+    /// By patterns of a bench's own.
+    #[cfg(feature = "server")]
+    Own(Plain),
 }
 
 /// Why frames give no measurements.
@@ -112,6 +165,10 @@ pub enum MeasuredError {
     #[cfg(feature = "server")]
     #[error(transparent)]
     Feed(#[from] SourceError),
+    /// The frames of a feed of its own patterns.
+    #[cfg(feature = "server")]
+    #[error(transparent)]
+    Own(#[from] FileError),
 }
 
 impl Run {
@@ -159,14 +216,18 @@ impl Look {
                     true => (sum.measurements(&run.setup, settling, false)?, sum.warnings()),
                     false => followed(&sum, &run.setup, settling, false)?,
                 };
-                Ok(Measured { measurements, warnings })
+                Ok(Measured::Hadamard { measurements, warnings })
             }
             #[cfg(feature = "server")]
             Seen::Feed { frames, bench } => {
-                let sweep = bench.sweeps.read(mean(frames)).map_err(SourceError::from)?;
+                let sweeps = match &bench.sweeps {
+                    Shown::Hadamard(sweeps) => sweeps,
+                    Shown::Own(sweeps) => return Ok(Measured::Own(sweeps.read(mean(frames))?)),
+                };
+                let sweep = sweeps.read(mean(frames)).map_err(SourceError::from)?;
                 let source = Source::of_sweep(&bench.origin, sweep)?;
                 let warnings = source.all_warnings();
-                Ok(Measured { measurements: source.measurements, warnings })
+                Ok(Measured::Hadamard { measurements: source.measurements, warnings })
             }
         }
     }

@@ -14,11 +14,16 @@ use std::sync::Arc;
 pub struct Picture {
     /// The first image has number 1, each further one the next number.
     pub number: u64,
-    /// Side of the reconstructed image: 32 for a camera.
-    pub n: usize,
+    /// Side of the reconstructed image of Hadamard patterns: 32 for a camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub n: Option<usize>,
+    /// Height of the reconstructed image.
+    pub height: usize,
+    /// Width of the reconstructed image.
+    pub width: usize,
     /// The unit of readings and pixels; may be empty for a feed.
     pub unit: String,
-    /// The reconstructed image, (n, n).
+    /// The reconstructed image, (height, width).
     #[serde(skip)]
     pub counts: Vec<f32>,
     /// The enhanced image, (64, 64) in [0, 1], with white at 1.
@@ -29,9 +34,9 @@ pub struct Picture {
     #[serde(skip)]
     pub half_width: Option<Vec<f32>>,
     /// The readings, (n, n): that of Hadamard row `n r + c` at (r, c); NaN for a row
-    /// that was not measured.
+    /// that was not measured. `None` for other patterns.
     #[serde(skip)]
-    pub readings: Vec<f32>,
+    pub readings: Option<Vec<f32>>,
     /// The depth map that was fused.
     #[serde(skip)]
     pub depth: Option<Arc<DepthImage>>,
@@ -68,7 +73,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The reconstructed image, (n, n) in [0, 1], with white at 1.
+    /// The reconstructed image, (height, width) in [0, 1], with white at 1.
     #[cfg(feature = "server")]
     pub fn shares_of_white(&self) -> Vec<f32> {
         let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
@@ -82,12 +87,14 @@ impl Picture {
     pub fn of_counts(number: u64, counts: Vec<f32>, enhanced: Option<Vec<f32>>) -> Self {
         Self {
             number,
-            n: 32,
+            n: Some(32),
+            height: 32,
+            width: 32,
             unit: "ADC counts".to_owned(),
             counts,
             enhanced,
             half_width: None,
-            readings: Vec::new(),
+            readings: None,
             depth: None,
             arrived: Instant::now(),
             arrived_unix_ms: clock::since_1970().as_millis() as u64,

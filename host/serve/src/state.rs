@@ -139,7 +139,7 @@ pub struct State<'s> {
 #[derive(Serialize)]
 struct Message<'s> {
     state: &'s State<'s>,
-    /// (n, n) in the unit of the picture: 32 and ADC counts for a camera.
+    /// (height, width) in the unit of the picture: 32 and ADC counts for a camera.
     image: Option<String>,
     /// (64, 64) shares of white; `null` if the learned stages are switched off.
     enhanced: Option<String>,
@@ -147,7 +147,7 @@ struct Message<'s> {
     /// without calibrated intervals.
     interval: Option<String>,
     /// (n, n): the reading of Hadamard row `n r + c` at (r, c); NaN for a row that
-    /// was not measured.
+    /// was not measured. `null` for other patterns.
     readings: Option<String>,
     /// (32, 32) distances in metres; `null` without a depth sensor.
     depth: Option<String>,
@@ -189,7 +189,7 @@ impl Published {
             image: picture.map(|picture| numbers(&picture.counts)),
             enhanced: picture.and_then(|picture| picture.enhanced.as_deref().map(numbers)),
             interval: picture.and_then(|picture| picture.half_width.as_deref().map(numbers)),
-            readings: picture.map(|picture| numbers(&picture.readings)),
+            readings: picture.and_then(|picture| picture.readings.as_deref().map(numbers)),
             depth: picture.and_then(|picture| Some(numbers(&picture.depth.as_ref()?.pixels_m))),
             drawing,
         };

@@ -9,7 +9,7 @@ use nirspi_nets::{
     MeasuredRows, MeasuredRowsError, Method, Networks, NoIntervals, Options, Sharpener,
     WeightsError, deblur, fusion,
 };
-use nirspi_recon::{Image, Rows, Side};
+use nirspi_recon::{Image, Rows, Shape, Side};
 use thiserror::Error;
 
 /// Number of simulated repetitions for the spread of an image.
@@ -27,10 +27,10 @@ pub enum White {
 impl White {
     /// The white level of this image, in its units; 0 for an image without light.
     #[must_use]
-    pub fn level(self, image: &Image) -> f32 {
+    pub fn level(self, image: &Image<impl Shape>) -> f32 {
         match self {
             Self::Known(level) => level,
-            Self::Brightest => brightest(image.pixels(), image.side().pixels()),
+            Self::Brightest => brightest(image.pixels(), image.size().width()),
         }
     }
 

@@ -11,14 +11,14 @@ const JUMP: f32 = 0.25;
 /// Share of a small change of white that a [`SteadyWhite`] takes over from each image.
 const SHARE: f32 = 0.1;
 
-/// The largest mean of 2 x 2 neighbours among `side` x `side` pixels; 0 for an image without light.
+/// The largest mean of 2 x 2 neighbours among pixels in rows of `width`; 0 for an image without light.
 #[must_use]
 #[cfg(feature = "enhance")]
-pub fn brightest(pixels: &[f32], side: usize) -> f32 {
-    let corners =
-        (0..side.saturating_sub(1)).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
-    let means = corners
-        .map(|at| (pixels[at] + pixels[at + 1] + pixels[at + side] + pixels[at + side + 1]) / 4.0);
+pub fn brightest(pixels: &[f32], width: usize) -> f32 {
+    let corners = (0..pixels.len().saturating_sub(width)).filter(|at| at % width + 1 < width);
+    let means = corners.map(|at| {
+        (pixels[at] + pixels[at + 1] + pixels[at + width] + pixels[at + width + 1]) / 4.0
+    });
     means.fold(0.0, f32::max)
 }
 

@@ -29,8 +29,8 @@ pub fn of_trace(found: &Found, footer: String) -> Chart {
         |name: &str, colour, dashed, points| Line { name: name.to_owned(), colour, dashed, points };
     let mut lines = vec![line("samples", 0, false, samples)];
     for (name, colour, edges) in [
-        ("the trigger rises: a pattern begins", 2, &first.edges),
-        ("the trigger rises too early: left out", 3, &first.extra),
+        ("edge of the trigger: a pattern begins", 2, &first.edges),
+        ("edge that comes too early: left out", 3, &first.extra),
     ] {
         if !edges.is_empty() {
             lines.push(line(name, colour, true, upright(edges)));

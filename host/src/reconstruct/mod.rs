@@ -16,7 +16,9 @@ pub use frame_reports::FrameReports;
 pub use many::Skipped;
 pub use networks::NetworksError;
 pub use one::{DropoutReport, LampReport, OneReport};
-pub use own::{OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, own_image};
+pub use own::{
+    OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, matrix_doubts, own_image,
+};
 pub use pipeline::{Pipeline, ResultFolder};
 pub use pipeline_error::PipelineError;
 pub use said::{AllSaid, Kind, Said};

@@ -258,7 +258,7 @@ fn same(
         None => settings.basis.to_string(),
     };
     let asked = settings.sparsity.map_or(MethodSettings::default().sparsity, Sparsity::Fixed);
-    let doubts: Vec<String> = doubts(&own, used).collect();
+    let doubts: Vec<String> = matrix_doubts(&own).collect();
     let made = |(&at, found): (&usize, MatrixReconstruction)| {
         check_finite(request.input, &found.image)?;
         let Plain { not_read, notes, .. } = &plain[at];
@@ -286,8 +286,9 @@ fn same(
     all.iter().zip(found).map(made).collect()
 }
 
-/// What patterns leave open.
-fn doubts(own: &OwnMatrix, used: usize) -> impl Iterator<Item = String> {
+/// What patterns leave open, one line each.
+pub fn matrix_doubts(own: &OwnMatrix) -> impl Iterator<Item = String> + use<> {
+    let used = own.patterns();
     let others = used.min(own.size().area()).saturating_sub(own.rank());
     let are = if others == 1 { "is a combination" } else { "are combinations" };
     let others = (others > 0).then(|| format!("{others} of {used} patterns {are} of others"));

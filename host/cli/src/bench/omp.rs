@@ -5,7 +5,7 @@ use crate::{backend, print, provenance, refused};
 use anyhow::{Context, Result};
 use clap::{ValueEnum, builder::RangedU64ValueParser};
 use nirspi::files::output::{Existing, write_result};
-use nirspi::files::problem;
+use nirspi::problem;
 use nirspi_eval::bench::omp::{self, Settings};
 use nirspi_recon::omp::Backend;
 use std::path::PathBuf;

@@ -8,7 +8,7 @@ use anyhow::Result;
 use nirspi::files::measurement::{PatternSelection, Selection};
 use nirspi::reconstruct::{OwnImage, OwnReport, own_image};
 use nirspi::source::Index;
-use nirspi_recon::reconstruct::{MatrixSettings, Method};
+use nirspi_recon::reconstruct::MatrixSettings;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -18,6 +18,9 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         field: args.matrix_field.clone(),
         transpose: args.source.transpose,
     };
+    let refused = |why| Usage(format!("--{why}"));
+    let of_method =
+        args.method.method.matrix_settings(&args.method.settings()?).map_err(refused)?;
     let all = args.source.index == Some(Index::All);
     let index = if all { None } else { args.source.one()? };
     let request = OwnImage {
@@ -26,7 +29,7 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
         patterns,
         readings: Selection { index, ..args.source.selection()? },
         all,
-        settings: settings(args)?,
+        settings: MatrixSettings { dark: !args.no_dark, ..of_method },
         dictionary: args.method.dictionary.as_deref(),
         sampling: args.sampling,
         out: &args.out,
@@ -35,25 +38,6 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
     };
     let report = spinning(|| own_image(request, stages()))?;
     args.report.print(&report, report.pictures.provenance(), |report| say(args, report))
-}
-
-fn settings(args: &Args) -> Result<MatrixSettings> {
-    let asked = args.method.method;
-    let Some(method) = asked.with_matrix() else {
-        let methods = Method::listed(|method| method.with_matrix().is_some());
-        return Err(Usage(format!(
-            "--method {asked} needs Hadamard rows, and --matrix gives other patterns: expected {methods}"
-        ))
-        .into());
-    };
-    Ok(MatrixSettings {
-        basis: args.method.basis()?,
-        strength: args.method.strength,
-        sparsity: args.method.sparsity,
-        non_negative: args.method.non_negative,
-        dark: !args.no_dark,
-        ..MatrixSettings::new(method)
-    })
 }
 
 fn say(args: &Args, report: &OwnReport) -> Result<()> {

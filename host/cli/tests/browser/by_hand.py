@@ -101,6 +101,8 @@ def message(given):
     }
     state["picture"] = {
         "n": 32,
+        "height": 32,
+        "width": 32,
         "unit": "ADC counts",
         "arrived_unix_ms": 1_764_000_000_123,
         "method": "tv",
@@ -331,10 +333,11 @@ def counted_anew(told):
     assert [row[1] for row in rows(page, "account")] == ["5", "0", "0", "0", "1 of 5"], rows(page, "account")
 
 
-def pointed(page, name, side, x, y):
-    """What the page says of the pixel under the cursor."""
+def pointed(page, name, side, x, y, height=None):
+    """What the page says of the pixel under the cursor, in an image of this side, or of this width and height."""
     box = page.locator(f"#{name}").bounding_box()
-    page.locator(f"#{name}").hover(position={"x": (x + 0.5) * box["width"] / side, "y": (y + 0.5) * box["height"] / side})
+    at = {"x": (x + 0.5) * box["width"] / side, "y": (y + 0.5) * box["height"] / (height or side)}
+    page.locator(f"#{name}").hover(position=at)
     return page.locator(f"#{name}-value").inner_text()
 
 
@@ -734,7 +737,8 @@ def feed(browser, address):
     told = Told(browser, address)
     page = told.page
     account = {"frames": 9, "empty_frames": 0, "refused": 2, "not_read": 0, "cut": 0}
-    bench = {"name": "DMD of room 3", "unit": "V", "n": 16, "order": "zig-zag", "patterns": 200, "readings": "pairs", "account": account}
+    bench = {"name": "DMD of room 3", "unit": "V", "height": 16, "width": 16, "order": "zig-zag", "patterns": 200}
+    bench |= {"readings": "pairs", "account": account}
     told.message |= {name: packed([at / 512 for at in range(16 * 16)]) for name in ["image", "readings"]}
     told.message |= {"enhanced": None, "interval": None, "depth": None}
     told.tell(
@@ -742,7 +746,7 @@ def feed(browser, address):
         offered={"fixed": True},
         scene=None,
         images={"shown": 12},
-        picture={"n": 16, "unit": "V", "white_counts": 0.5, "enhancement": None},
+        picture={"n": 16, "height": 16, "width": 16, "unit": "V", "white_counts": 0.5, "enhancement": None},
     )
     told.has("camera", "DMD of room 3")
     expect(page).to_have_title("nirspi DMD of room 3")
@@ -768,6 +772,22 @@ def feed(browser, address):
     ], identity
     told.tell(camera={"phase": "silent", "line": "no data for 3 s"})
     told.has("line", "no data for 3 s")
+    # Patterns of the bench's own: an oblong image, and nothing that knows Hadamard patterns.
+    told.message |= {"image": packed([at / 512 for at in range(6 * 8)]), "readings": None}
+    del told.message["state"]["picture"]["n"]
+    told.tell(
+        camera={"phase": "measuring", "line": "measuring", "feed": bench | {"height": 6, "width": 8, "order": "own"}},
+        offered={"models": [], "with_warm_start": []},
+        images={"shown": 13},
+        picture={"height": 6, "width": 8},
+    )
+    found = pointed(page, "image", 8, 7, 5, height=6)
+    assert found == "row 5, column 7: 0.0918 V, 18 % of white", found
+    expect(page.locator("#about-image").locator("xpath=..")).to_contain_text("reconstructed, 6 × 8")
+    for name in ["enhanced", "readings", "enhance", "model", "warm-start"]:
+        expect(page.locator(f"#{name}")).to_be_hidden()
+    assert [row[0] for row in rows(page, "estimates")] == ["white"], rows(page, "estimates")
+    assert rows(page, "identity")[1] == ["patterns", "200, 6 × 8", ""], rows(page, "identity")
     page.close()
 
 

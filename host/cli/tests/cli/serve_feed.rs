@@ -3,6 +3,8 @@
 use crate::bench::{Bench, Measured};
 use crate::feed::{as_text, header, image_of_file};
 use crate::serve::serve;
+use nirspi::files::npy;
+use serde_json::Value;
 use std::fs::OpenOptions;
 use std::io::Write;
 
@@ -78,6 +80,65 @@ fn a_feed_that_ends_is_opened_again_and_may_have_another_side() {
     let lost = server.state("lost", |state| state["camera"]["phase"] == "lost");
     assert!(lost["events"].to_string().contains("the feed ended"), "{lost}");
     sender.join().unwrap();
+}
+
+#[test]
+fn own_patterns_have_the_pictures_of_a_recording() {
+    let bench = Bench::new();
+    let weights: Vec<f32> =
+        (0..100 * 48_u32).map(|at| (at.wrapping_mul(2_654_435_761) >> 19 & 1) as f32).collect();
+    let scene: Vec<f32> = (0..48).map(|at| (at % 8 + at / 8) as f32).collect();
+    let see = |row: &[f32]| 7.0 + row.iter().zip(&scene).map(|(w, x)| w * x).sum::<f32>();
+    let y: Vec<f32> = weights.chunks(48).map(see).collect();
+    bench.write("patterns.npy", &npy::encode(&[100, 6, 8], &weights));
+    bench.write("y.npy", &npy::encode(&[100], &y));
+    let matrix = ["--matrix", "patterns.npy"];
+    bench.run(&[&["reconstruct", "y.npy", "--out", "file"], &matrix[..]].concat()).succeeded();
+    let own = "\"height\":6,\"width\":8,\"patterns\":100,\"readings\":\"single\",\"unit\":\"V\"";
+    bench.write("log.txt", format!("{{{own}}}\n{}", as_text(&y)).as_bytes());
+    let server = serve(&bench, &[&["--camera", "feed:log.txt"], &matrix[..]].concat());
+    let state = server.state("shown", |state| state["picture"]["number"] == 1);
+    // The same to the bit as `reconstruct --matrix` of a file with these readings.
+    bench.write("live.npy", &server.get("/image.npy").body);
+    assert_eq!(bench.pixels("live.npy"), bench.pixels("file/image.npy"));
+    let (picture, feed) = (&state["picture"], &state["camera"]["feed"]);
+    let size = |of: &Value| (of["height"].clone(), of["width"].clone(), of.get("n").is_none());
+    assert_eq!(size(picture), (6.into(), 8.into(), true), "{state}");
+    assert_eq!((size(feed), &feed["order"]), (size(picture), &"own".into()), "{state}");
+    assert_eq!((&picture["unit"], &picture["enhancement"]), (&"V".into(), &().into()));
+    assert_eq!(state["camera"]["leds"], "none");
+    // Nothing is offered that such patterns do not have.
+    let offered = &state["offered"];
+    let none = Value::Array(Vec::new());
+    assert_eq!((&offered["models"], &offered["with_warm_start"]), (&none, &none));
+    assert!(!offered["methods"].to_string().contains("hadamard"), "{offered}");
+    server
+        .change("{\"method\": \"hadamard\"}")
+        .refuses(400, "expected omp, pseudo-inverse, tikhonov, fista, tv or auto");
+    // A frame with a reading that was not read, by another method.
+    assert_eq!(server.change("{\"method\": \"pseudo-inverse\"}").status, 200);
+    let mut log = OpenOptions::new().append(true).open(bench.path("log.txt")).unwrap();
+    log.write_all(as_text(&y).replacen(&as_text(&y[..1]), "nan\n", 1).as_bytes()).unwrap();
+    let state = server.state("shown", |state| state["picture"]["number"] == 2);
+    assert_eq!(state["picture"]["method"], "pseudo-inverse", "{state}");
+    let silent = server.state("silent", |state| state["camera"]["phase"] == "silent");
+    assert_eq!(silent["camera"]["feed"]["account"]["not_read"], 1, "{silent}");
+    assert!(silent["camera"]["line"].as_str().unwrap().starts_with("no data for "), "{silent}");
+    // What does not fit is refused before anything is served.
+    let refused = |more: &[&str], words: &str| {
+        let first = ["serve", "--listen", "127.0.0.1:0", "--camera", "feed:log.txt", "-q"];
+        bench
+            .run(&[&first[..], more].concat())
+            .failed(if more.len() > 2 { 2 } else { 1 }, &[words]);
+    };
+    refused(&[], "feed:log.txt: the feed shows 100 patterns of its own on 6 x 8 pixels");
+    refused(&["--matrix", "s-matrix:31"], "expected 31 pixels for s-matrix:31");
+    refused(&["--matrix", "y.npy"], "expected (M, 48) or (M, 6, 8)");
+    let hadamard = ["--matrix", "patterns.npy", "--method", "hadamard"];
+    refused(&hadamard, "--method hadamard needs Hadamard rows");
+    refused(&["--matrix", "patterns.npy", "--warm-start"], "--warm-start");
+    let camera = ["serve", "--camera", "virtual", "--matrix", "patterns.npy"];
+    bench.run(&camera).failed(2, &["--matrix belongs to --camera feed:ADDR"]);
 }
 
 #[test]

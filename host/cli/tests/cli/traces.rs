@@ -110,7 +110,7 @@ fn lost_and_extra_edges_are_warnings_and_cost_one_pattern() {
     let outcome = bench.run(&[&readings[..], &["--out", "m.npz"]].concat()).succeeded();
     let warnings: Vec<&str> = outcome.stderr.lines().collect();
     assert!(warnings[0].contains("1 reading is not there") && warnings[0].ends_with(": 31"));
-    assert!(warnings[1].contains("rises too early") && warnings[1].ends_with(": at 1944"));
+    assert!(warnings[1].contains("comes too early") && warnings[1].ends_with(": at 1944"));
     assert!(warnings.len() == 2 && outcome.stdout.starts_with("128 readings"), "{outcome:?}");
     let image = ["reconstruct", "m.npz", "--shown", "natural", "--method", "tikhonov"];
     bench.run(&image).succeeded();

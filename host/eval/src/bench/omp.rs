@@ -9,7 +9,7 @@ pub use gpu::on_gpu;
 use super::{FASTEST_SWEEPS_HZ, Times, milliseconds, scenes};
 use crate::error::{EvalError, Result};
 use nalgebra::DMatrix;
-use nirspi::files::problem::ProblemFile;
+use nirspi::problem::ProblemFile;
 use nirspi_recon::omp::{
     Backend, Limits, MixedDictionary, OmpError, Problem, Solution, solve_batch,
 };

@@ -71,8 +71,8 @@ pub struct Trigger {
 /// A feed of its own patterns where Hadamard patterns are needed. `Display` is one line.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
-    "the feed shows {count} patterns of its own on {size} pixels, expected Hadamard patterns; capture records it, and \
-     reconstruct --matrix PATTERNS makes images of the recording"
+    "the feed shows {count} patterns of its own on {size} pixels, expected Hadamard patterns; serve --matrix PATTERNS \
+     shows it, capture records it, and reconstruct --matrix PATTERNS makes images of the recording"
 )]
 pub struct OwnPatterns {
     /// Height and width of the image.

@@ -1,4 +1,5 @@
-//! Fields that a file calls something else: `--field volts,h_row=order,n=side,sign=polarity`.
+//! Fields that a file calls something else: `--field volts,h_row=order,n=side,sign=polarity`. What stands beside the readings in a
+//! group or structure, `run1/h_row` beside `run1/y`, needs no name.
 
 use super::{FileError, Selection};
 use crate::fields::Fields;
@@ -13,15 +14,17 @@ pub(super) fn called<'w>(
     fields: &mut Fields,
     want: &'w Selection,
 ) -> Result<Cow<'w, Selection>, FileError> {
-    let Some(named) = want.field.as_ref().filter(|named| named.contains('=')) else {
+    let Some(named) = want.field.as_ref().filter(|_| !fields.is_unnamed()) else {
         return Ok(Cow::Borrowed(want));
     };
-    if fields.is_unnamed() || fields.holds(named) {
+    if fields.holds(named) {
+        beside(fields, named);
         return Ok(Cow::Borrowed(want));
     }
     let mut readings = Vec::new();
-    for part in named.split(',').map(str::trim) {
-        let renamed = part.split_once('=').map(|(name, own)| (name.trim(), own.trim()));
+    for part in named.split(',').map(|part| part.trim().trim_start_matches('/')) {
+        let renamed = part.split_once('=');
+        let renamed = renamed.map(|(name, own)| (name.trim(), own.trim().trim_start_matches('/')));
         let known = renamed
             .and_then(|(name, own)| Some((NAMES.into_iter().find(|known| *known == name)?, own)));
         match known {
@@ -33,6 +36,20 @@ pub(super) fn called<'w>(
             None => readings.push(part),
         }
     }
+    if let Some(first) = readings.first() {
+        beside(fields, first);
+    }
     let field = (!readings.is_empty()).then(|| readings.join(","));
     Ok(Cow::Owned(Selection { field, ..want.clone() }))
+}
+
+/// Takes what else is needed from the group or structure of the readings, where the file has it nowhere else.
+fn beside(fields: &mut Fields, readings: &str) {
+    let Some(at) = readings.rfind(['.', '/']) else { return };
+    for name in NAMES {
+        let own = format!("{}{name}", &readings[..=at]);
+        if !fields.holds(name) && fields.holds(&own) {
+            fields.call(&own, name);
+        }
+    }
 }

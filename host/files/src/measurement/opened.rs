@@ -63,7 +63,7 @@ impl Opened {
                 expected,
             });
         }
-        let name = readings_field(&fields, want)?;
+        let name = readings_field(&mut fields, want)?;
         let is_d = name == "d";
         let default = if name == "d" { Form::Differences } else { Form::Pairs };
         let stated = if name == "y" { stated_form(&mut fields) } else { None };

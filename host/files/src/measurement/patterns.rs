@@ -177,7 +177,7 @@ impl<'p> PatternArray<'p> {
         })
     }
 
-    fn axes(&self) -> Vec<u64> {
+    pub(super) fn axes(&self) -> Vec<u64> {
         self.shape.iter().map(|&axis| axis as u64).collect()
     }
 
@@ -191,7 +191,7 @@ impl<'p> PatternArray<'p> {
         format!("[{}]", places.join(", "))
     }
 
-    fn refused(&self, found: String, expected: impl Into<String>) -> FileError {
+    pub(super) fn refused(&self, found: String, expected: impl Into<String>) -> FileError {
         FileError::field(self.path, self.name.clone(), found, expected)
     }
 }

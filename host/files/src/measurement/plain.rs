@@ -10,8 +10,11 @@ use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings
 use super::sides::{make_pairs, two_fields};
 use super::weighed::{Plain, Which};
 use super::{FileError, Form, Selection};
+use crate::array::has_shape;
+use crate::field::Field;
 use crate::fields::Fields;
-use std::path::Path;
+use nirspi_recon::Size;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Reads patterns from `matrix`, a file, a folder of pictures, or [`NamedPatterns`], and one number for each pattern
@@ -56,7 +59,9 @@ fn read_which(
         Some(Ok(set)) => {
             let refused = |(found, expected)| FileError::field(matrix, "--size", found, expected);
             let patterns = set.patterns(of_patterns.size).map_err(refused)?;
-            return Ok(read_numbers(readings, want, which, patterns.count)?.plain(patterns));
+            let numbers = read_numbers(readings, want, which, patterns.count)?;
+            let patterns = weighing(patterns, numbers.form);
+            return Ok(numbers.plain(&patterns));
         }
         Some(Err(expected)) => {
             return Err(FileError::field(matrix, "--matrix", "is no file and no set", expected));
@@ -70,12 +75,79 @@ fn read_which(
         match read_numbers(readings, want, which, arrangement.count) {
             Ok(mut numbers) => {
                 numbers.notes.extend(array.note(arrangement));
-                return Ok(numbers.plain(array.patterns(arrangement)));
+                let patterns = weighing(array.patterns(arrangement), numbers.form);
+                return Ok(numbers.plain(&patterns));
             }
             Err(error) => refused = refused.or(Some(error)),
         }
     }
     Err(refused.unwrap_or_else(|| FileError::kind(matrix, "no patterns", "patterns")))
+}
+
+/// Sweeps of patterns of a user's own that come one after another, without a file.
+///
+/// # Invariant
+/// [`read`](Self::read) gives what [`read_plain`] makes of a file with the same readings
+/// (`tests::a_sweep_of_own_patterns_is_read_as_a_file_with_its_readings_is`).
+pub struct PlainSweeps {
+    origin: PathBuf,
+    patterns: Arc<Patterns>,
+    form: Form,
+    simulated: Option<bool>,
+}
+
+impl PlainSweeps {
+    /// Sweeps of the patterns of `matrix`, a file, a folder of pictures, or [`NamedPatterns`], of which there must be
+    /// `count` of this size. Messages name `origin` for the readings.
+    ///
+    /// # Errors
+    /// [`FileError`] if there are other patterns.
+    pub fn new(
+        matrix: &Path,
+        (count, size): (usize, Size),
+        origin: &Path,
+        form: Form,
+        simulated: Option<bool>,
+    ) -> Result<Self, FileError> {
+        let expected = format!("{count} patterns of {size} pixels, as the header of the feed says");
+        let patterns = match NamedPatterns::instead_of(matrix) {
+            Some(set) => {
+                let found = set.and_then(|set| set.patterns(Some(size)).map_err(|(_, why)| why));
+                let refused =
+                    |why| FileError::field(matrix, "--matrix", "does not fit the feed", why);
+                let found = found.map_err(refused)?;
+                if (found.count, found.size) != (count, size) {
+                    let has = format!("is {} patterns of {} pixels", found.count, found.size);
+                    return Err(FileError::field(matrix, "--matrix", has, expected));
+                }
+                found
+            }
+            None => {
+                let array = PatternArray::open(matrix, &PatternSelection::default())?;
+                let mut all = array.arrangements(Some(size))?.into_iter();
+                match all.find(|arrangement| arrangement.count == count) {
+                    Some(arrangement) => array.patterns(arrangement),
+                    None => return Err(array.refused(has_shape(&array.axes()), expected)),
+                }
+            }
+        };
+        let patterns = weighing(patterns, form);
+        Ok(Self { origin: origin.to_owned(), patterns, form, simulated })
+    }
+
+    /// The readings of one sweep. NaN: the pattern was not read.
+    ///
+    /// # Errors
+    /// As [`read_plain`].
+    pub fn read(&self, readings: Vec<f64>) -> Result<Plain, FileError> {
+        let name = if self.form == Form::Differences { "d" } else { "y" };
+        let readings = Field { shape: vec![readings.len()], real: readings, imaginary: None };
+        let fields = Fields::of_fields(&self.origin, vec![(name.to_owned(), readings)]);
+        let want = Selection { form: Some(self.form), ..Selection::default() };
+        let numbers = numbers_of(fields, &want, Which::One, self.patterns.count)?;
+        let numbers = Numbers { simulated: self.simulated, ..numbers };
+        Ok(numbers.plain(&self.patterns).remove(0))
+    }
 }
 
 /// A number for each pattern, NaN where none was read.
@@ -87,18 +159,22 @@ struct Numbers {
     notes: Vec<String>,
 }
 
+/// What readings of this form weigh the light with.
+fn weighing(patterns: Patterns, form: Form) -> Arc<Patterns> {
+    Arc::new(match form {
+        Form::Single => patterns,
+        _ => patterns.differences(),
+    })
+}
+
 impl Numbers {
-    fn plain(self, patterns: Patterns) -> Vec<Plain> {
-        let Self { all, form, simulated, notes } = self;
-        let patterns = Arc::new(match form {
-            Form::Single => patterns,
-            _ => patterns.differences(),
-        });
+    fn plain(self, patterns: &Arc<Patterns>) -> Vec<Plain> {
+        let Self { all, simulated, notes, .. } = self;
         let plain = |all: Vec<f64>| {
             let (places, not_read): (Vec<usize>, Vec<usize>) =
                 (0..all.len()).partition(|&k| is_reading(all[k]));
             let values = places.iter().map(|&k| all[k]).collect();
-            let (patterns, notes) = (Arc::clone(&patterns), notes.clone());
+            let (patterns, notes) = (Arc::clone(patterns), notes.clone());
             Plain { patterns, values, places, not_read, simulated, notes, dark: true }
         };
         all.into_iter().map(plain).collect()
@@ -111,9 +187,18 @@ fn read_numbers(
     which: Which,
     patterns: usize,
 ) -> Result<Numbers, FileError> {
-    let mut fields = Fields::open(path, want.decimal_comma)?;
+    numbers_of(Fields::open(path, want.decimal_comma)?, want, which, patterns)
+}
+
+fn numbers_of(
+    mut fields: Fields,
+    want: &Selection,
+    which: Which,
+    patterns: usize,
+) -> Result<Numbers, FileError> {
+    let path = &fields.path().to_owned();
     let want = &*called(&mut fields, want)?;
-    let name = readings_field(&fields, want)?;
+    let name = readings_field(&mut fields, want)?;
     let mut notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
     let paired = make_pairs(&mut fields, &name, want)?;
     let is_paired = paired.is_some() || two_fields(&fields, &name).is_some();
@@ -193,4 +278,51 @@ fn form_of(
     let pairs = joined(&shape, Some(&[patterns as u64]), Form::Pairs);
     let is_pairs = pairs != shape && Layout::of(&pairs, 2 * patterns, false).is_some();
     Ok(if is_pairs && !is_single { Form::Pairs } else { Form::Single })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{Zip, file, npy_f64, zip};
+
+    #[test]
+    fn a_sweep_of_own_patterns_is_read_as_a_file_with_its_readings_is() {
+        let (size, count) = (Size::new(1, 3).unwrap(), 4);
+        let weights: Vec<f64> = (0..12).map(|at| f64::from(at % 5)).collect();
+        let (_kept, matrix) = file("matrix.npy", &npy_f64("(4, 3)", &weights));
+        let (_also, turned) = file("turned.npy", &npy_f64("(3, 4)", &weights));
+        for form in Form::ALL {
+            let readings: Vec<f64> = (0..count * form.readings())
+                .map(|at| if at == 2 { f64::NAN } else { at as f64 })
+                .collect();
+            let field = if form == Form::Differences { "d.npy" } else { "y.npy" };
+            let shape = format!("({},)", readings.len());
+            let members = [(field, npy_f64(&shape, &readings))];
+            let (_folder, path) = file("lab.npz", &zip(Zip::Stored, &members));
+            let want = Selection { form: Some(form), ..Selection::default() };
+            for patterns in [&matrix, &turned] {
+                let of = PatternSelection { size: Some(size), ..PatternSelection::default() };
+                let mut expected = read_plain(patterns, &of, &path, &want).unwrap();
+                expected.notes.retain(|note| !note.contains("along the last axis"));
+                let sweeps =
+                    PlainSweeps::new(patterns, (count, size), Path::new("feed"), form, None)
+                        .unwrap();
+                assert_eq!(sweeps.read(readings.clone()).unwrap(), expected, "{form:?}");
+            }
+        }
+        let refused = |matrix: &str, count| {
+            let feed = Path::new("feed");
+            let other =
+                PlainSweeps::new(Path::new(matrix), (count, size), feed, Form::Single, None);
+            other.err().unwrap().to_string()
+        };
+        let others = refused(matrix.to_str().unwrap(), 5);
+        assert!(
+            others.contains("has shape (4, 3), expected 5 patterns of 1 x 3 pixels"),
+            "{others}"
+        );
+        let others = refused("s-matrix:7", 7);
+        assert!(others.starts_with("s-matrix:7: "), "{others}");
+        assert!(refused("s-matrix:8", 7).contains("expected an order"), "no such set");
+    }
 }

@@ -116,18 +116,22 @@ pub(super) fn found_names(fields: &Fields) -> Vec<String> {
 }
 
 /// Finds the field of the readings.
-pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String, FileError> {
-    let missing = |field, expected| {
-        let (path, found) = (fields.path().to_owned(), found_names(fields));
-        Err(FileError::Missing { path, field, found, expected })
-    };
+pub(super) fn readings_field(fields: &mut Fields, want: &Selection) -> Result<String, FileError> {
+    let (path, found) = (fields.path().to_owned(), found_names(fields));
+    let missing = |field, expected| Err(FileError::Missing { path, field, found, expected });
     if fields.is_unnamed() {
         return match &want.field {
-            None => Ok("y".to_owned()),
+            None => {
+                fields.column_beside_counters();
+                Ok("y".to_owned())
+            }
             Some(_) => missing("--field", "no --field for an array without a name"),
         };
     }
     if let Some(field) = &want.field {
+        if let Some(both) = twice(fields, field) {
+            return Ok(both);
+        }
         return match fields.holds(field) || two_fields(fields, field).is_some() {
             true => Ok(field.clone()),
             false => {
@@ -140,15 +144,40 @@ pub(super) fn readings_field(fields: &Fields, want: &Selection) -> Result<String
     if let [only] = fields.names()
         && only != "d"
     {
+        if fields.is_counter_of_words() {
+            let found = "counts in even steps, as times and numbers of lines do";
+            let expected = "a column of readings: numbers without units";
+            return Err(FileError::field(fields.path(), only.clone(), found, expected));
+        }
         return Ok(only.clone());
     }
     match ["y", "d"].into_iter().find(|name| fields.holds(name)) {
         Some("d") if matches!(want.form, Some(Form::Single | Form::Pairs | Form::Halves)) => {
             missing("y", "y, the readings; `d` holds differences")
         }
+        Some(name) if matches!(want.form, None | Some(Form::Pairs)) => {
+            let both = twice(fields, &format!("{name},{name}"));
+            if both.is_some() {
+                fields.note(format!("the columns `{name}` are pattern and complement"));
+            }
+            Ok(both.unwrap_or_else(|| name.to_owned()))
+        }
         Some(name) => Ok(name.to_owned()),
+        None if !["h_row", "n", "sign"].iter().any(|name| fields.holds(name))
+            && let Some(only) = fields.column_beside_counters() =>
+        {
+            Ok(only)
+        }
         None => missing("d", "y (raw readings) or d (differential), or --field NAME"),
     }
+}
+
+/// The two columns of a text that are called by one name, which stands twice in `field`.
+fn twice(fields: &Fields, field: &str) -> Option<String> {
+    let (first, second) = field.split_once(',')?;
+    let other = format!("{}.1", second.trim());
+    let is_twice = first.trim() == second.trim() && fields.is_columns() && fields.holds(&other);
+    is_twice.then(|| format!("{},{other}", first.trim()))
 }
 
 /// The shape that readings of this form must have for so many rows, for an error message.

@@ -515,3 +515,67 @@ proptest! {
         }
     }
 }
+
+/// Readings of a 2 x 2 sweep of pairs, as lines.
+const LINES: [f64; 8] = [10.0, 0.5, 6.0, 4.0, 7.0, 3.0, 5.5, 4.5];
+
+fn of_text(content: &str, field: Option<&str>) -> Result<(Vec<f64>, String), String> {
+    let (_folder, path) = file("scope.csv", content.as_bytes());
+    let field = field.map(str::to_owned);
+    let found = read(&path, &Selection { field, ..shown(Order::Natural) });
+    let found = found.map_err(|error| line(&error, "scope.csv"))?;
+    Ok((found.readings.values().to_vec(), found.notes.join("; ")))
+}
+
+fn lines(of: impl Fn(usize, f64) -> String) -> String {
+    LINES.iter().enumerate().map(|(at, &y)| of(at, y) + "\n").collect()
+}
+
+#[test]
+fn a_column_that_counts_is_no_readings_and_that_is_told() {
+    let told = "left out: columns that count in even steps: ";
+    let scope = format!("Second,CH1\n{}", lines(|at, y| format!("{:.3},{y}", at as f64 * 1e-3)));
+    assert_eq!(of_text(&scope, None), Ok((LINES.to_vec(), format!("{told}`Second`"))));
+    // Without a heading, as some oscilloscopes write it: columns have numbers.
+    let scope = lines(|at, y| format!("{at},{y}"));
+    assert_eq!(of_text(&scope, None), Ok((LINES.to_vec(), format!("{told}`1`"))));
+    // Two columns that do not count are not chosen among, and a named one is taken as it is.
+    let two = format!("t,CH1,CH2\n{}", lines(|at, y| format!("{at},{y},{}", 9.0 - y)));
+    assert!(of_text(&two, None).unwrap_err().contains("found `t`, `CH1`, `CH2`"));
+    assert_eq!(of_text(&two, Some("CH1")), Ok((LINES.to_vec(), String::new())));
+    // Readings with units are words, and what is left is the number of a line.
+    let words = format!("Sample,Mean\n{}", lines(|at, y| format!("{at},{y} mV")));
+    let refused = of_text(&words, None).unwrap_err();
+    assert!(refused.contains("`Sample` counts in even steps"), "{refused}");
+}
+
+#[test]
+fn two_columns_of_one_name_are_pattern_and_complement() {
+    let pairs: String =
+        LINES.as_chunks::<2>().0.iter().map(|[on, off]| format!("{on},{off}\n")).collect();
+    let text = format!("y,y\n{pairs}");
+    let (readings, notes) = of_text(&text, None).unwrap();
+    assert_eq!(readings, LINES);
+    assert!(notes.ends_with("the columns `y` are pattern and complement"), "{notes}");
+    let volts = format!("volt,volt\n{pairs}");
+    assert_eq!(of_text(&volts, Some("volt,volt")).unwrap().0, LINES);
+}
+
+#[test]
+fn what_stands_beside_the_readings_in_their_group_belongs_to_them() {
+    let mut members = with("y.npy", Vec::new());
+    for member in &mut members {
+        member.0 = match member.0 {
+            "n.npy" => "run/n.npy",
+            "h_row.npy" => "run/h_row.npy",
+            "d.npy" => "run/volts.npy",
+            other => other,
+        };
+    }
+    let (_folder, path) = file("lab.npz", &zip(Zip::Stored, &members));
+    for field in ["run/volts", "/run/volts"] {
+        let want = Selection { field: Some(field.to_owned()), ..form(Form::Differences) };
+        let found = read(&path, &want).unwrap();
+        assert_eq!((found.h_row.as_slice(), found.h_row.side().pixels()), (&[0, 3, 1][..], 2));
+    }
+}

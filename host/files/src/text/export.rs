@@ -5,7 +5,7 @@
 //! No number of a table is lost in silence: what is left out is no line of numbers like those of the
 //! table, and is told (`tests::a_table_with_a_gap_is_refused_as_before`).
 
-use super::{BLOCK, Line, Lines, Separators, Words, parse, shortened};
+use super::{BLOCK, Line, Lines, OVERLOAD, Separators, Words, parse, shortened};
 use crate::FileError;
 use crate::field::Field;
 use nirspi_recon::words::count_of;
@@ -161,23 +161,21 @@ impl Block {
 
 /// The longest run of lines with the same number of cells, some of them numbers.
 fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
-    let mut best = 0..0;
+    let (mut best, mut parted) = (0..0, None);
     let mut has_whole = false;
+    // A number with a comma is one with a decimal comma.
+    let is_number = |word: &str| {
+        let decimal = if word.contains(',') { ',' } else { '.' };
+        !word.trim_matches('"').is_empty() && parse(word, decimal).is_some()
+    };
     for between in [Some(';'), Some('\t'), Some(','), None] {
-        if let Some(mark) = between
-            && !all.text.contains(mark)
-        {
+        if !all.marks.contains(&between.unwrap_or(' ')) {
             // Lines without the mark are one cell each, whatever the mark is.
             if std::mem::replace(&mut has_whole, true) {
                 continue;
             }
         }
         let shape = |(_, line): &Line<'_>| {
-            // A number with a comma is one with a decimal comma.
-            let is_number = |word: &str| {
-                let decimal = if word.contains(',') { ',' } else { '.' };
-                !word.is_empty() && parse(word, decimal).is_some()
-            };
             let mut cells = cells(line, between);
             let mut count = 0;
             let has_number = cells.by_ref().inspect(|_| count += 1).any(is_number);
@@ -188,10 +186,16 @@ fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
         let mut start = 0;
         for run in shapes.chunk_by(|a, b| a == b) {
             if run[0].1 && run.len() > best.len() {
-                best = start..start + run.len();
+                (best, parted) = (start..start + run.len(), between);
             }
             start += run.len();
         }
+    }
+    // A heading may have words that stand for numbers, such as `NA`. A word above a number tells it.
+    if let [(_, first), (_, second), ..] = &all.lines[best.clone()] {
+        let mut pairs = cells(first, parted).zip(cells(second, parted));
+        let is_word = |word: &str| !word.is_empty() && !is_number(word);
+        best.start += usize::from(pairs.any(|(above, below)| is_word(above) && is_number(below)));
     }
     (best.len() >= LEAST_LINES).then_some(best)
 }
@@ -205,22 +209,31 @@ fn heading<'t>(
     number: impl Fn(&str) -> Option<f64>,
 ) -> (Option<Vec<&'t str>>, bool) {
     let last = numeric.last().copied().unwrap_or(0);
+    let is_blank = |word: &str| word.trim_matches('"').is_empty();
+    // `NA` and `inf` may be names, and so may the numbers of channels.
+    let is_name = |word: &str| match number(word) {
+        Some(number) if number.is_finite() && number < OVERLOAD => word.len() < 3,
+        _ => true,
+    };
     let words = |(_, line): &Line<'t>| {
         let cells: Vec<&str> = cells(line, between).collect();
         let are_words = cells.len() > last
-            && numeric.iter().all(|&at| cells[at].is_empty() || number(cells[at]).is_none())
-            && numeric.iter().any(|&at| !cells[at].is_empty());
+            && numeric.iter().all(|&at| is_name(cells[at]))
+            && numeric.iter().any(|&at| !is_blank(cells[at]) && number(cells[at]).is_none());
         are_words.then_some(cells)
     };
     let is_unit = |word: &str| {
         let plain = word.trim_matches(['(', ')', '[', ']', '"', ' ']);
         UNITS.contains(&plain.to_lowercase().as_str())
     };
-    let mut above = before.iter().rev().map(words);
-    let Some(Some(nearest)) = above.next() else { return (None, false) };
+    let mut above = before.iter().rev();
+    let Some(nearest) = above.next().and_then(words) else { return (None, false) };
     let are_units = numeric.iter().all(|&at| is_unit(nearest[at]));
-    match above.next() {
-        Some(Some(names)) if are_units => (Some(names), true),
+    // Channels above their units may have numbers for names, as `x-axis,1,2`.
+    let names = above.next().map(|(_, line)| cells(line, between).collect::<Vec<&str>>());
+    let are_names = |names: &Vec<&str>| names.len() > last && number(names[numeric[0]]).is_none();
+    match names.filter(are_names) {
+        Some(names) if are_units => (Some(names), true),
         _ => (Some(nearest), false),
     }
 }
@@ -303,6 +316,36 @@ mod tests {
         );
         let (found, _) = columns(&text);
         assert!(found[1].0 == "Channel A" && found[1].1[0] >= 9.9e37 && found[1].1[1] == 8.5);
+    }
+
+    #[test]
+    fn headings_of_more_programs_are_read() {
+        let y = |k: u32| 8.5 - f64::from(k);
+        let k = f64::from;
+        // Channels that have numbers for names, above their units.
+        let text = format!("x-axis,1,2\nsecond,Volt,Volt\n{}", rows(|k| format!("{k},{},5", y(k))));
+        let (found, _) = columns(&text);
+        assert_eq!(found, [expected("x-axis", k), expected("1", y), expected("2", |_| 5.0)]);
+        // Words that stand for no number, or for too large a one, are names above numbers.
+        for name in ["NA", "none", "inf", "null", "OL", "1"] {
+            for (text, wanted) in [
+                (rows(|k| format!("{k},{}", y(k))), [expected("time", k), expected(name, y)]),
+                (rows(|k| format!("{},{k}", y(k))), [expected("time", y), expected(name, k)]),
+            ] {
+                assert_eq!(columns(&format!("time,{name}\n{text}")).0, wanted);
+            }
+        }
+        // A name may begin with any letter.
+        let text = format!("µs;y\n{}", rows(|k| format!("{k};{}", y(k))));
+        assert_eq!(columns(&text).0, [expected("µs", k), expected("y", y)]);
+        // R quotes its names, of which the first is empty.
+        let text = format!("\"\",\"y\"\n{}", rows(|k| format!("\"{k}\",{}", y(k))));
+        assert_eq!(columns(&text).0, [expected("", k), expected("y", y)]);
+        // Two columns of one name.
+        let text = format!("y,y\n{}", rows(|k| format!("{},{k}", y(k))));
+        let (found, told) = columns(&text);
+        assert_eq!(found, [expected("y", y), expected("y.1", k)]);
+        assert_eq!(told, "another column is called `y`, too: here `y.1`");
     }
 
     #[test]

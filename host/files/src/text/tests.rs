@@ -163,3 +163,25 @@ fn what_is_no_number_is_named_with_its_line() {
         assert!(message.contains(found), "{message}");
     }
 }
+
+#[test]
+fn lists_in_brackets_are_rows() {
+    for (list, shape) in [
+        ("[1, 2.5, 3]", [1, 3]),
+        ("{1,2.5,3}\r\n", [1, 3]),
+        ("[1. 2.5\n 3. ]", [1, 3]),
+        ("[np.float64(1.0), np.float64(2.5), np.float64(3.0)]", [1, 3]),
+        ("[[1, 2.5, 3], [1, 2.5, 3]]", [2, 3]),
+        ("((1, 2.5, 3),\n (1, 2.5, 3),)", [2, 3]),
+    ] {
+        let expected = [1.0, 2.5, 3.0].repeat(shape[0]);
+        assert_eq!(table(list), (shape.to_vec(), expected), "{list}");
+    }
+}
+
+#[test]
+fn words_of_instruments_for_no_reading_and_for_too_much() {
+    let (_, numbers) = table("1.5\n--\n---\nO.L\n2\n");
+    assert!(numbers[1].is_nan() && numbers[2].is_nan());
+    assert_eq!((numbers[0], numbers[3], numbers[4]), (1.5, 9.9e37, 2.0));
+}

@@ -174,7 +174,15 @@ impl Series {
                 archive.each_block(field, |found| shape.accept(found), take).map(axes)
             }
             Form::Other(fields) => {
-                let numbers = fields.read(field, |found| shape.accept(found))?;
+                // Samples in memory are not copied.
+                let read;
+                let numbers = match fields.held(field) {
+                    Some(held) if shape.fits(&axes(held.shape.clone())) => held,
+                    _ => {
+                        read = fields.read(field, |found| shape.accept(found))?;
+                        &read
+                    }
+                };
                 if numbers.imaginary.is_some() {
                     let name = if fields.is_unnamed() { UNNAMED } else { field };
                     let found = "has complex numbers";
@@ -183,7 +191,7 @@ impl Series {
                 if let Some(take) = take {
                     take(&numbers.real);
                 }
-                Ok(axes(numbers.shape))
+                Ok(axes(numbers.shape.clone()))
             }
         }
     }

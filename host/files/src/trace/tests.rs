@@ -114,6 +114,31 @@ fn lost_and_extra_edges_are_named_and_move_no_other_reading() {
 }
 
 #[test]
+fn a_trigger_may_fall_or_change_with_each_pattern() {
+    let levels: Vec<f64> = (0..16).map(f64::from).collect();
+    let with = |trigger: &str| Cut { trigger: Some(trigger.to_owned()), ..Cut::default() };
+    let made = Made::new(&levels, 20, 7);
+    let mut low = made.clone();
+    low.trigger.iter_mut().for_each(|level| *level = 5.0 - *level);
+    assert!(close(&low.read(&with("T:fall")).unwrap().readings, &levels));
+    // Half of each pattern is that of the next one, where the wrong edge is taken.
+    let mut half = made.clone();
+    half.trigger.iter_mut().enumerate().for_each(|(at, level)| {
+        *level = f64::from(u8::from(at >= 7 && (at - 7) % 20 < 10));
+    });
+    let found = half.read(&with("T:fall")).unwrap();
+    assert!((found.readings[0] - 0.5).abs() < 1e-9, "{:?}", found.readings);
+    let mut toggles = made.clone();
+    toggles.trigger.iter_mut().enumerate().for_each(|(at, level)| {
+        *level = f64::from(u8::from(at >= 7 && (at - 7) / 20 % 2 == 0));
+    });
+    assert!(close(&toggles.read(&with("T:both")).unwrap().readings, &levels));
+    toggles.trigger.fill(1.0);
+    assert!(toggles.told(&with("T:fall")).contains("`T` falls nowhere, expected two edges"));
+    assert!(toggles.told(&with("T:up")).contains("`T:up` is not in the file"));
+}
+
+#[test]
 fn the_first_and_the_last_pattern_count_if_they_are_whole() {
     let levels: Vec<f64> = (0..16).map(f64::from).collect();
     let made = Made::new(&levels, 20, 7);

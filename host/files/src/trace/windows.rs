@@ -8,7 +8,8 @@ const EXTRA: f64 = 0.5;
 /// Part of the usual interval that the first and the last pattern need.
 const WHOLE: f64 = 0.9;
 
-/// Parts of a trigger's range: it rises where it reaches the second one after it was below the first one.
+/// Parts of a trigger's range: it is high where it reaches the second one, and low below the first one. Between them it is what
+/// it was before.
 const LOW: f64 = 0.4;
 const HIGH: f64 = 0.6;
 
@@ -91,16 +92,46 @@ impl Windows {
     }
 }
 
-/// Finds where a trigger rises, a block of its samples at a time.
+/// Where patterns begin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Edge {
+    Rise,
+    Fall,
+    Both,
+}
+
+impl Edge {
+    /// The field of a trigger and its edges: `NAME`, `NAME:fall`, or `NAME:both`, unless that is a field itself.
+    pub(super) fn of<'n>(trigger: &'n str, names: &[String]) -> (&'n str, Self) {
+        let is_field = |name: &str| names.iter().any(|known| known == name);
+        match trigger.rsplit_once(':') {
+            Some((name, "fall")) if !is_field(trigger) => (name, Self::Fall),
+            Some((name, "both")) if !is_field(trigger) => (name, Self::Both),
+            _ => (trigger, Self::Rise),
+        }
+    }
+
+    /// What the trigger does there.
+    pub(super) fn verb(self) -> &'static str {
+        match self {
+            Self::Rise => "rises",
+            Self::Fall => "falls",
+            Self::Both => "changes",
+        }
+    }
+}
+
+/// Finds the edges of a trigger, a block of its samples at a time.
 pub(super) struct Edges {
+    edge: Edge,
     low: f64,
     high: f64,
     /// The next sample's place.
     at: usize,
     skip: usize,
     most: usize,
-    was_low: bool,
-    /// Whether the first edge is the beginning of the trace, where the trigger is high.
+    was_high: Option<bool>,
+    /// Whether the first edge is the beginning of the trace, where the trigger is as after an edge.
     begins_high: bool,
     found: Vec<usize>,
 }
@@ -116,15 +147,16 @@ pub(super) struct Cut {
 
 impl Edges {
     /// Edges of a trigger within this range, behind the first `skip` samples, and one more than `most` of them.
-    pub(super) fn new((least, greatest): (f64, f64), skip: usize, most: usize) -> Self {
+    pub(super) fn new(edge: Edge, (least, greatest): (f64, f64), skip: usize, most: usize) -> Self {
         let level = |part: f64| (1.0 - part) * least + part * greatest;
         Self {
+            edge,
             low: level(LOW),
             high: level(HIGH),
             at: 0,
             skip,
             most,
-            was_low: false,
+            was_high: None,
             begins_high: false,
             found: Vec::new(),
         }
@@ -132,18 +164,20 @@ impl Edges {
 
     pub(super) fn take(&mut self, block: &[f64]) {
         for &level in block {
-            if self.at >= self.skip {
-                if self.at == self.skip && level >= self.high && level > self.low {
-                    self.begins_high = true;
+            let is_high = level >= self.high && level > self.low;
+            if self.at >= self.skip && (is_high || level < self.low) {
+                let is_ours = match self.edge {
+                    Edge::Rise => is_high,
+                    Edge::Fall => !is_high,
+                    Edge::Both => true,
+                };
+                let begins = self.at == self.skip;
+                let is_new = self.was_high.map_or(begins, |before| before != is_high);
+                if is_ours && is_new && self.found.len() <= self.most {
+                    self.begins_high |= begins;
                     self.found.push(self.at);
-                } else if level < self.low {
-                    self.was_low = true;
-                } else if self.was_low && level >= self.high {
-                    self.was_low = false;
-                    if self.found.len() <= self.most {
-                        self.found.push(self.at);
-                    }
                 }
+                self.was_high = Some(is_high);
             }
             self.at += 1;
         }

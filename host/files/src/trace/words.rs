@@ -62,7 +62,7 @@ impl Found {
         }
         if !extra.is_empty() {
             lines.push(format!(
-                "{} left out, because the trigger rises too early for a pattern: at {}",
+                "{} left out, because an edge of the trigger comes too early for a pattern: at {}",
                 are(extra.len(), "edge"),
                 first_of(extra)
             ));

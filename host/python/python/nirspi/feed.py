@@ -416,6 +416,7 @@ def serve(
     strength: float | None = None,
     sum: int = 1,
     record_to: str | os.PathLike[str] | None = None,
+    matrix: str | os.PathLike[str] | None = None,
     device: str = "cpu",
     wait: bool = True,
     **header: Any,
@@ -442,6 +443,8 @@ def serve(
         Newest frames whose mean makes an image.
     record_to : path, optional
         Folder for recordings, which the page begins and ends.
+    matrix : path, optional
+        File of the patterns of a feed that shows its own: ``height``, ``width`` and ``patterns``.
     device : str
         Where OMP and networks compute, see :func:`nirspi.devices`.
     wait : bool
@@ -469,6 +472,7 @@ def serve(
         "strength": None if strength is None else float(strength),
         "sum": _arrays.count(sum, "sum", least=1),
         "record_to": None if record_to is None else os.fspath(record_to),
+        "matrix": None if matrix is None else os.fspath(matrix),
         "device": str(device),
     }
     page = Page(feed, wanted)

@@ -12,7 +12,9 @@
 use super::kind::GoingOn;
 use super::prior::SharedNetwork;
 use super::report::{Reconstruction, Report};
-use super::{MatrixMethod, OmpSettings, ReconstructError, Recursive, Sparsity, Strength};
+use super::{
+    MatrixMethod, MatrixSettings, OmpSettings, ReconstructError, Recursive, Sparsity, Strength,
+};
 use crate::{Backend, Basis, Measurements};
 use rayon::prelude::*;
 use std::fmt;
@@ -200,6 +202,31 @@ impl Method {
     #[must_use]
     pub fn with_matrix(self) -> Option<MatrixMethod> {
         self.0.with_matrix
+    }
+
+    /// The settings of the method for a user's own patterns.
+    ///
+    /// # Errors
+    /// [`ReconstructError::NeedsRows`] if there is none.
+    pub fn matrix_settings(
+        self,
+        settings: &MethodSettings,
+    ) -> Result<MatrixSettings, ReconstructError> {
+        let method = self.with_matrix().ok_or(ReconstructError::NeedsRows { method: self })?;
+        Ok(MatrixSettings {
+            basis: settings.basis,
+            atoms: settings.dictionary.as_ref().map(|atoms| atoms.values.to_vec()),
+            strength: match settings.strength {
+                Strength::Fixed(strength) => Some(strength),
+                Strength::CrossValidated { .. } => None,
+            },
+            sparsity: match settings.sparsity {
+                Sparsity::Fixed(atoms) => Some(atoms),
+                Sparsity::CrossValidated { .. } | Sparsity::Noise => None,
+            },
+            non_negative: settings.non_negative,
+            ..MatrixSettings::new(method)
+        })
     }
 
     /// The method that has this one for a user's own patterns.

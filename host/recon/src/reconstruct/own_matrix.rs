@@ -40,6 +40,7 @@ mod complete;
 mod error;
 mod folds;
 mod gram;
+mod live;
 mod many;
 mod problem;
 mod pseudo_inverse;
@@ -50,6 +51,7 @@ use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
 use crate::{Image, Shape, Size};
 pub use error::MatrixError;
+pub use live::LiveMatrix;
 use nalgebra::{DMatrix, DVector};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -284,18 +286,20 @@ impl OwnMatrix {
         all: &[&[f64]],
         settings: &MatrixSettings,
     ) -> Result<Vec<MatrixReconstruction>, MatrixError> {
+        self.check(all, settings)?;
+        let kept = many::Kept::default();
+        let batches =
+            all.chunks(BATCH).map(|all| many::Many::new(self, settings, all, &kept).images());
+        Ok(batches.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
+    fn check(&self, all: &[&[f64]], settings: &MatrixSettings) -> Result<(), MatrixError> {
         for y in all {
             if y.len() != self.patterns() {
                 return Err(MatrixError::Length { found: y.len(), expected: self.patterns() });
             }
             finite("y", y, 1)?;
         }
-        self.check(settings)?;
-        let batches = all.chunks(BATCH).map(|all| many::Many::new(self, settings, all).images());
-        Ok(batches.collect::<Result<Vec<_>, _>>()?.concat())
-    }
-
-    fn check(&self, settings: &MatrixSettings) -> Result<(), MatrixError> {
         let (size, area) = (self.size, self.size.area());
         if let Some(atoms) = &settings.atoms {
             if atoms.is_empty() || !atoms.len().is_multiple_of(area) {

@@ -54,6 +54,8 @@ export function show({ settings, offered }) {
   for (const word of ["order", "sampling", "sweep"]) {
     document.querySelector(`label[data-word=${word}]`).hidden = offered.fixed;
   }
+  for (const label of document.querySelectorAll("[data-networks]")) label.hidden = offered.models.length === 0;
+  document.querySelector("label[data-word=recursive]").hidden = offered.with_warm_start.length === 0;
   $("record").hidden = !offered.records;
   $("no-record").hidden = offered.records;
   if (isTouched()) return;

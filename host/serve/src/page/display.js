@@ -22,7 +22,7 @@ const PANELS = {
   interval: { side: 64, of: "interval", fixed: [0, .5], scale: 100, unit: "% of white", digits: 1 },
   depth: { side: 32, of: "depth", white: null, scale: 1, unit: "m", digits: 3 },
 };
-for (const [id, panel] of Object.entries(PANELS)) Object.assign(panel, { id, values: null, cell: null });
+for (const [id, panel] of Object.entries(PANELS)) Object.assign(panel, { id, width: panel.side, height: panel.side, values: null, cell: null });
 
 function percentile(sorted, share) { return sorted[Math.round(share * (sorted.length - 1))]; }
 
@@ -50,11 +50,12 @@ const inWords = (panel, value) => Number.isNaN(value) ? "not measured"
 
 function draw(panel, picture) {
   const canvas = $(panel.id), pen = canvas.getContext("2d"), bar = $(`${panel.id}-bar`);
-  canvas.width = canvas.height = panel.side;
+  [canvas.width, canvas.height] = [panel.width, panel.height];
+  canvas.style.aspectRatio = `${panel.width} / ${panel.height}`;
   bar.hidden = !panel.values;
   if (!panel.values) return;
   const [low, high] = range(panel, picture), map = $("colours").value, colours = table(map);
-  const pixels = new ImageData(panel.side, panel.side), step = 255 / Math.max(high - low, 1e-12);
+  const pixels = new ImageData(panel.width, panel.height), step = 255 / Math.max(high - low, 1e-12);
   panel.values.forEach((value, at) => {
     const level = Math.max(0, Math.min(255, Math.round((value - low) * step)));
     for (let part = 0; part < 3; part++) pixels.data[4 * at + part] = colours[3 * level + part];
@@ -69,31 +70,33 @@ function draw(panel, picture) {
 // The value under the cursor.
 function point(panel) {
   const cell = $(`${panel.id}-cell`), says = $(`${panel.id}-value`);
-  const is = panel.cell !== null && panel.values !== null;
+  // The next image may be smaller.
+  const is = panel.cell?.[0] < panel.width && panel.cell[1] < panel.height && panel.values !== null;
   cell.hidden = !is;
   if (!is) return text(says, "");
-  const [x, y] = panel.cell, value = panel.values[y * panel.side + x], share = 100 / panel.side;
-  Object.assign(cell.style, { left: `${x * share}%`, top: `${y * share}%`, width: `${share}%`, height: `${share}%` });
+  const [x, y] = panel.cell, value = panel.values[y * panel.width + x];
+  const across = 100 / panel.width, down = 100 / panel.height;
+  Object.assign(cell.style, { left: `${x * across}%`, top: `${y * down}%`, width: `${across}%`, height: `${down}%` });
   const white = panel.id === "image" && shown.state.picture.white_counts;
-  const where = panel.id === "readings" ? `pattern ${y * panel.side + x}` : `row ${y}, column ${x}`;
+  const where = panel.id === "readings" ? `pattern ${y * panel.width + x}` : `row ${y}, column ${x}`;
   text(says, `${where}: ${inWords(panel, value)}${white ? `, ${(100 * value / white).toFixed(0)} % of white` : ""}`);
 }
 
 function move(panel, x, y) {
-  const inside = at => Math.max(0, Math.min(panel.side - 1, at));
-  panel.cell = [inside(x), inside(y)];
+  const inside = (at, most) => Math.max(0, Math.min(most - 1, at));
+  panel.cell = [inside(x, panel.width), inside(y, panel.height)];
   point(panel);
 }
 
 for (const panel of Object.values(PANELS)) {
   const canvas = $(panel.id);
   const at = event => {
-    const box = canvas.getBoundingClientRect(), cell = offset => Math.floor(offset / box.width * panel.side);
-    move(panel, cell(event.clientX - box.left), cell(event.clientY - box.top));
+    const box = canvas.getBoundingClientRect(), cell = (offset, size, cells) => Math.floor(offset / size * cells);
+    move(panel, cell(event.clientX - box.left, box.width, panel.width), cell(event.clientY - box.top, box.height, panel.height));
   };
   canvas.onpointermove = canvas.onpointerdown = at;
   canvas.onpointerleave = canvas.onblur = () => { panel.cell = null; point(panel); };
-  canvas.onfocus = () => { if (!panel.cell) move(panel, panel.side / 2, panel.side / 2); };
+  canvas.onfocus = () => { if (!panel.cell) move(panel, panel.width >> 1, panel.height >> 1); };
   const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
   canvas.onkeydown = event => {
     const step = STEPS[event.key];
@@ -119,10 +122,11 @@ export function show(message) {
   const isNew = shown?.state.images.shown !== images.shown || shown?.enhanced !== message.enhanced;
   shown = message;
   if (isNew) {
-    // A feed has its own side and unit.
-    const own = { side: picture?.n ?? 32, unit: foreign(picture?.unit ?? ""), isAny: picture?.unit !== "ADC counts" };
+    // A feed has its own size and unit.
+    const { height, width } = picture ?? { height: 32, width: 32 };
+    const own = { height, width, unit: foreign(picture?.unit ?? ""), isAny: picture?.unit !== "ADC counts" };
     for (const id of ["readings", "image"]) Object.assign(PANELS[id], own);
-    $("about-image").previousSibling.textContent = `reconstructed, ${own.side} × ${own.side} `;
+    $("about-image").previousSibling.textContent = `reconstructed, ${height} × ${width} `;
     for (const panel of Object.values(PANELS)) panel.values = values(message[panel.of]);
     redraw();
   }
@@ -132,6 +136,9 @@ export function show(message) {
     : ![32, 64].includes(picture?.n ?? 32) ? "off: the networks take 32 × 32 and 64 × 64"
     : state.overload.enhancement_off ? "off: this computer is too slow" : "no image yet");
   $("no-readings").hidden = message.readings !== null;
+  // Patterns of a bench's own have no place in a table of Hadamard rows, and no networks.
+  const isOwn = picture !== null && picture.n === undefined;
+  $("readings-panel").hidden = $("enhanced-panel").hidden = isOwn;
   $("depth-panel").hidden = message.depth === null;
   $("interval-panel").hidden = !message.interval;
   const found = picture?.enhancement;

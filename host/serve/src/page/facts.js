@@ -28,10 +28,14 @@ export function show(state, drawnPerSecond) {
   ]);
   text($("overload"), overload.line ?? "");
   $("overload").hidden = overload.line === null;
+  // Networks do not know patterns of a bench's own.
+  const isKnown = !picture || picture.n !== undefined;
   list($("estimates"), [
-    ["blur", found ? `${fixed(found.blur_px, 2)} of 64 px` : "–"],
-    ["noise", found ? `${fixed(found.noise, 3)} of white` : "–"],
-    ["inconsistency", found ? fixed(found.inconsistency, 2) : "–"],
+    ...(isKnown ? [
+      ["blur", found ? `${fixed(found.blur_px, 2)} of 64 px` : "–"],
+      ["noise", found ? `${fixed(found.noise, 3)} of white` : "–"],
+      ["inconsistency", found ? fixed(found.inconsistency, 2) : "–"],
+    ] : []),
     ["white", picture ? `${amount(picture.white_counts, 1)} ${picture.unit}` : "–"],
   ]);
   const { identity, measurement, feed } = camera;
@@ -44,7 +48,7 @@ export function show(state, drawnPerSecond) {
       ["ADC", `${identity.adc_hz / 1e6} MS/s, ${identity.adc_bits} bit`],
     ] : []),
     ...(feed ? [
-      ["patterns", `${whole(feed.patterns)}, ${feed.n} × ${feed.n}`],
+      ["patterns", `${whole(feed.patterns)}, ${feed.height} × ${feed.width}`],
       ["order", foreign(feed.order)],
       ["readings", feed.readings],
       ["numbers refused", whole(feed.account.refused), feed.account.refused > 0],

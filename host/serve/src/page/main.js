@@ -58,8 +58,9 @@ $("save").onclick = () => {
 $("save-npy").onclick = () => {
   const shown = display.onScreen();
   if (!shown?.image) return;
-  download(npy(display.values(shown.image), shown.state.picture.n), "image.npy");
-  if (shown.enhanced) download(npy(display.values(shown.enhanced), 64), "enhanced.npy");
+  const { height, width } = shown.state.picture;
+  download(npy(display.values(shown.image), height, width), "image.npy");
+  if (shown.enhanced) download(npy(display.values(shown.enhanced), 64, 64), "enhanced.npy");
 };
 
 function says(words) {

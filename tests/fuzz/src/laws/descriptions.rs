@@ -2,8 +2,8 @@
 
 use crate::{Law, MIB, place, read, seeds};
 use nirspi::calibration::{KeptCalibration, KeptFlatField};
-use nirspi::files::order_table::read_order_table;
-use nirspi::files::settings::{Options, Takes, from_file};
+use nirspi::order_table::read_order_table;
+use nirspi::settings::{Options, Takes, from_file};
 use nirspi::response::Settling;
 use nirspi_optics::CameraModel;
 use nirspi_recon::{Order, Side};
@@ -50,7 +50,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "orders",
         reads: "an order table (text)",
-        readers: &["host/files/src/order_table.rs", "host/patterns/src/rows.rs"],
+        readers: &["host/src/order_table.rs", "host/patterns/src/rows.rs"],
         holds: orders,
         seeds: order_seeds,
         longest: 6144,
@@ -59,7 +59,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "settings-files",
         reads: "a settings file (TOML)",
-        readers: &["host/files/src/settings.rs"],
+        readers: &["host/src/settings.rs"],
         holds: settings_files,
         seeds: settings_seeds,
         longest: 2048,

@@ -8,7 +8,8 @@ use nirspi::files::measurement::{
 use nirspi::files::output::Existing;
 use nirspi::files::table::Table;
 use nirspi::files::trace::{self, Cut, Raw};
-use nirspi::files::{FileError, npy, problem};
+use nirspi::files::{FileError, npy};
+use nirspi::problem;
 use nirspi_recon::{Measurements, Order, Rows, Side, Size};
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -47,7 +48,7 @@ pub const LAWS: &[Law] = &[
             "host/files/src/measurement/stack.rs",
             "host/files/src/array.rs",
             "host/files/src/stored.rs",
-            "host/files/src/problem.rs",
+            "host/src/problem.rs",
         ],
         holds: fields,
         seeds: field_seeds,

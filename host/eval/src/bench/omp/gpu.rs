@@ -4,7 +4,7 @@
 use super::super::{milliseconds, scenes};
 use super::{Precision, Report, Settings, Timed, matrix, report};
 use crate::error::Result;
-use nirspi::files::problem::ProblemFile;
+use nirspi::problem::ProblemFile;
 use nirspi_recon::Side;
 use nirspi_recon::omp::gpu::{Device, DeviceDictionary, DevicePictures};
 use nirspi_recon::omp::{BackendError, Limits, Solution};

@@ -74,7 +74,7 @@ pub(in crate::measurement) fn read_fourier(
 ) -> Result<Vec<Plain>, FileError> {
     let mut fields = Fields::open(readings, want.decimal_comma)?;
     let want = &*called(&mut fields, want)?;
-    let name = readings_field(&fields, want)?;
+    let name = readings_field(&mut fields, want)?;
     let notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
     let simulated = read_simulated(&mut fields);
     let refused =

@@ -21,8 +21,7 @@ use rayon::prelude::*;
 const ROUNDING: f64 = 1e-9;
 
 /// What the patterns say of Tikhonov's problem, before any measurement.
-pub(super) struct Products<'o> {
-    own: &'o OwnMatrix,
+pub(super) struct Products {
     transform: Transform<Size>,
     /// Squares of the expected sizes; 0 for the mean, which has no penalty.
     sizes: Vec<f32>,
@@ -32,16 +31,15 @@ pub(super) struct Products<'o> {
     sums: DVector<f64>,
     /// Squared norm of each pattern.
     energies: DVector<f64>,
-    strengths: Vec<f64>,
-    /// Whether a strength is to be chosen.
-    chooses: bool,
     dark: bool,
 }
 
 /// Tikhonov's images of all measurements and of the folds, not yet made.
 pub(super) struct Folds<'p> {
-    of: &'p Products<'p>,
+    own: &'p OwnMatrix,
+    of: &'p Products,
     y: DVector<f64>,
+    strengths: Vec<f64>,
     /// All measurements, then those of each fold.
     parts: Vec<Part>,
 }
@@ -74,10 +72,10 @@ struct Level {
     dark: DarkLevel,
 }
 
-impl<'o> Products<'o> {
+impl Products {
     /// `None` for atoms of one's own or single pixels, and for more patterns than pixels, whose
     /// number is reduced instead.
-    pub(super) fn new(own: &'o OwnMatrix, settings: &MatrixSettings) -> Option<Self> {
+    pub(super) fn new(own: &OwnMatrix, settings: &MatrixSettings) -> Option<Self> {
         let is_ours = settings.atoms.is_none()
             && settings.basis != Basis::Pixel
             && own.patterns() <= own.size.area();
@@ -94,26 +92,30 @@ impl<'o> Products<'o> {
             values
         })) * (largest * largest);
         Some(Self {
-            own,
             transform,
             sizes,
             products,
             sums: own.patterns.column_sum(),
             energies: energies(&own.patterns),
-            strengths: settings
-                .strength
-                .map_or_else(|| STRENGTHS.to_vec(), |strength| vec![strength]),
-            chooses: settings.strength.is_none(),
             dark: settings.dark,
         })
     }
 
-    /// The problem of these measurements.
-    pub(super) fn folds(&self, y: &[f64]) -> Folds<'_> {
-        let mut folds = Folds { of: self, y: DVector::from_column_slice(y), parts: Vec::new() };
+    /// The problem of these measurements by the patterns of which these are the products. Without a strength, one is
+    /// chosen.
+    pub(super) fn folds<'p>(
+        &'p self,
+        own: &'p OwnMatrix,
+        y: &[f64],
+        strength: Option<f64>,
+    ) -> Folds<'p> {
+        let strengths = strength.map_or_else(|| STRENGTHS.to_vec(), |strength| vec![strength]);
+        let (y, parts) = (DVector::from_column_slice(y), Vec::new());
+        let mut folds = Folds { own, of: self, y, strengths, parts };
+        let y = &folds.y;
         let every: Vec<usize> = (0..y.len()).collect();
         let mut parts = vec![folds.part(&every, self.dark)];
-        if self.chooses {
+        if strength.is_none() {
             parts.extend(super::folds(y.len()).map(|(kept, _)| folds.part(&kept, self.dark)));
         }
         folds.solve(&mut parts);
@@ -131,7 +133,7 @@ impl Folds<'_> {
 
     /// Errors of each strength on the held-back measurements: sums of squares.
     pub(super) fn errors(&self) -> Vec<f64> {
-        let strengths = 0..self.of.strengths.len();
+        let strengths = 0..self.strengths.len();
         strengths
             .map(|strength| self.parts[1..].iter().map(|part| self.missed(part, strength)).sum())
             .collect()
@@ -141,7 +143,7 @@ impl Folds<'_> {
     fn fit(&self, strength: usize) -> (Fit, f64) {
         let whole = &self.parts[0];
         let level = self.level(whole, &(&self.of.products * &whole.found[strength]));
-        let weights: DVector<f64> = self.of.own.patterns.tr_mul(&whole.found[strength]);
+        let weights: DVector<f64> = self.own.patterns.tr_mul(&whole.found[strength]);
         let unit = weights.amax().max(f64::MIN_POSITIVE);
         let mut image: Vec<f32> = weights.iter().map(|&weight| (weight / unit) as f32).collect();
         self.of.transform.analyse(&mut image);
@@ -149,7 +151,7 @@ impl Folds<'_> {
         self.of.transform.synthesise(&mut image);
         let pixels = image.iter().map(|&value| f64::from(value) * unit + level.mean);
         let pixels = DVector::from_iterator(image.len(), pixels);
-        (Fit { pixels, dark: level.dark }, self.of.strengths[strength])
+        (Fit { pixels, dark: level.dark }, self.strengths[strength])
     }
 
     fn part(&self, kept: &[usize], fits_dark: bool) -> Part {
@@ -187,7 +189,7 @@ impl Folds<'_> {
             let seen = product(&self.of.products, &directions);
             for ((run, part), seen) in runs.iter_mut().zip(&*parts).zip(seen) {
                 if !run.has_settled() {
-                    run.advance(part.projected(seen) * run.scale, &self.of.strengths);
+                    run.advance(part.projected(seen) * run.scale, &self.strengths);
                 }
             }
         }
@@ -211,7 +213,7 @@ impl Folds<'_> {
             true => (0.0, y * 0.0),
             false => (shown / energy, y / spread),
         };
-        Run::new(y, scale, spread * scale, self.of.strengths.len())
+        Run::new(y, scale, spread * scale, self.strengths.len())
     }
 
     /// Mean and dark level that fit the measurements of a part best; `seen` are those of its image

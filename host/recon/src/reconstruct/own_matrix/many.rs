@@ -6,7 +6,7 @@
 //! (`tests::many::images_are_those_of_each_alone`). The patterns of one fold at a time are prepared, so that the memory
 //! does not grow with the folds.
 
-use super::folds::Products;
+use super::folds::{Folds, Products};
 use super::problem::{Fit, Prepared};
 use super::pseudo_inverse::PseudoInverse;
 use super::{
@@ -17,14 +17,22 @@ use crate::Image;
 use crate::omp::Stop;
 use nalgebra::DVector;
 use rayon::prelude::*;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Measurements by the same patterns, which were checked.
 pub(super) struct Many<'m> {
     own: &'m OwnMatrix,
     settings: &'m MatrixSettings,
     all: &'m [&'m [f64]],
-    products: OnceLock<Option<Products<'m>>>,
+    kept: &'m Kept,
+}
+
+/// What depends on the patterns alone, for settings that differ in method, strength and number of atoms at most.
+#[derive(Default)]
+pub(super) struct Kept {
+    products: OnceLock<Option<Products>>,
+    /// The patterns of no fold, as a method needs them.
+    whole: Mutex<Option<(MatrixMethod, Arc<Prepared>)>>,
 }
 
 /// An image, not yet in its final form.
@@ -45,8 +53,9 @@ impl<'m> Many<'m> {
         own: &'m OwnMatrix,
         settings: &'m MatrixSettings,
         all: &'m [&'m [f64]],
+        kept: &'m Kept,
     ) -> Self {
-        Self { own, settings, all, products: OnceLock::new() }
+        Self { own, settings, all, kept }
     }
 
     /// The image of each.
@@ -124,7 +133,7 @@ impl<'m> Many<'m> {
                 if let Some(products) = self.products() =>
             {
                 let made = |at: &usize| {
-                    let (fit, strength) = products.folds(self.all[*at]).chosen();
+                    let (fit, strength) = self.folds(products, *at).chosen();
                     Made { fit, strength: Some(strength), atoms: None }
                 };
                 which.iter().map(made).collect()
@@ -144,8 +153,13 @@ impl<'m> Many<'m> {
         MatrixReconstruction { image, method, strength, atoms, dark, residual }
     }
 
-    fn products(&self) -> Option<&Products<'m>> {
-        self.products.get_or_init(|| Products::new(self.own, self.settings)).as_ref()
+    fn products(&self) -> Option<&Products> {
+        self.kept.products.get_or_init(|| Products::new(self.own, self.settings)).as_ref()
+    }
+
+    /// The problem of Tikhonov's method, of which there are the products.
+    fn folds<'p>(&'p self, products: &'p Products, at: usize) -> Folds<'p> {
+        products.folds(self.own, self.all[at], self.settings.strength)
     }
 
     fn prepared(&self, method: MatrixMethod, at: Vec<usize>) -> Result<Prepared, MatrixError> {
@@ -153,8 +167,14 @@ impl<'m> Many<'m> {
         Prepared::new(self.own, &settings, at)
     }
 
-    fn whole(&self, method: MatrixMethod) -> Result<Prepared, MatrixError> {
-        self.prepared(method, (0..self.own.patterns()).collect())
+    fn whole(&self, method: MatrixMethod) -> Result<Arc<Prepared>, MatrixError> {
+        let mut kept = self.kept.whole.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, whole)) = kept.as_ref().filter(|(of, _)| *of == method) {
+            return Ok(Arc::clone(whole));
+        }
+        let whole = Arc::new(self.prepared(method, (0..self.own.patterns()).collect())?);
+        *kept = Some((method, Arc::clone(&whole)));
+        Ok(whole)
     }
 
     fn penalised(&self, penalty: Penalty, which: &[usize]) -> Result<Vec<Made>, MatrixError> {
@@ -243,7 +263,7 @@ impl<'m> Many<'m> {
         if penalty == Penalty::Tikhonov
             && let Some(products) = self.products()
         {
-            return Ok(which.iter().map(|&at| products.folds(self.all[at]).errors()).collect());
+            return Ok(which.iter().map(|&at| self.folds(products, at).errors()).collect());
         }
         self.errors(MatrixMethod::Penalty(penalty), which, |prepared| {
             let images =

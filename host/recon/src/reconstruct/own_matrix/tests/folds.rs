@@ -2,7 +2,7 @@
 
 use super::super::folds::Products;
 use super::super::gram::{are_independent, gram};
-use super::super::many::Many;
+use super::super::many::{Kept, Many};
 use super::super::problem::Prepared;
 use super::super::{MatrixMethod, MatrixSettings, OwnMatrix, Penalty, STRENGTHS, images, rank};
 use super::{normal, patterns, scene, seen, side};
@@ -20,14 +20,14 @@ fn all_folds_at_once_give_what_each_alone_gives() {
         let y: Vec<f64> = seen(&weights, &image, 0.05).iter().map(|y| 1e-3 * y + 0.04).collect();
         let method = MatrixMethod::Penalty(Penalty::Tikhonov);
         let settings = MatrixSettings { dark, ..MatrixSettings::new(method) };
-        let alone = Many::new(&own, &settings, &[&y])
+        let alone = Many::new(&own, &settings, &[&y], &Kept::default())
             .errors(method, &[0], |prepared| {
                 Ok(vec![prepared.problem(&y).penalised(Penalty::Tikhonov, &STRENGTHS)])
             })
             .unwrap()
             .remove(0);
         let products = Products::new(&own, &settings).unwrap();
-        let folds = products.folds(&y);
+        let folds = products.folds(&own, &y, None);
         let case = format!("kind {kind}, {count} patterns, dark {dark}");
         for (k, (one, all)) in alone.iter().zip(folds.errors()).enumerate() {
             assert!((all / one - 1.0).abs() < 0.02, "{case}, {}: {one}, {all}", STRENGTHS[k]);

@@ -1,6 +1,8 @@
 //! Many measurements by the same patterns.
 
-use super::super::{BATCH, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
+use super::super::{
+    BATCH, LiveMatrix, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty,
+};
 use super::{METHODS, patterns, scene, seen, side};
 use crate::Basis;
 
@@ -47,4 +49,35 @@ fn any_number_of_measurements_is_taken() {
     assert_eq!(own.reconstruct_all(&[], &settings), Ok(Vec::new()));
     let short = own.reconstruct_all(&[&y, &y[1..]], &settings);
     assert_eq!(short, Err(MatrixError::Length { found: 39, expected: 40 }));
+}
+
+/// Fewer patterns than pixels, and orthogonal ones.
+#[test]
+fn a_live_view_chooses_once_for_many_images() {
+    for (kind, count) in [(0, 40), (1, 64)] {
+        let weights = patterns(kind, count, 64, 4);
+        let own = OwnMatrix::new(side(8), &weights).unwrap();
+        let measured = measurements(&weights);
+        for method in METHODS.into_iter().chain([MatrixMethod::Best]) {
+            let settings = MatrixSettings::new(method);
+            let mut live = LiveMatrix::new(own.clone(), settings.clone(), 3);
+            let alone = |y: &[f64]| own.reconstruct(y, &settings).unwrap();
+            let first = live.image(&measured[0]).unwrap();
+            assert_eq!(first, alone(&measured[0]), "kind {kind}, {method:?}");
+            // What was chosen for the first serves two more, of which the noisy one would choose something else.
+            let kept = MatrixSettings {
+                method: first.method,
+                strength: first.strength,
+                sparsity: first.atoms.map(|(atoms, _)| atoms),
+                ..settings.clone()
+            };
+            for y in [&measured[1], &measured[2]] {
+                let made = live.image(y).unwrap();
+                assert_eq!(made, own.reconstruct(y, &kept).unwrap(), "kind {kind}, {method:?}");
+            }
+            assert_eq!(live.image(&measured[1]).unwrap(), alone(&measured[1]), "chosen anew");
+            assert!(live.image(&measured[1][1..]).is_err());
+            assert_eq!(live.image(&measured[2]).unwrap(), alone(&measured[2]), "after an error");
+        }
+    }
 }

@@ -21,9 +21,8 @@
 //! command has is refused. What is saved is read back as the same settings
 //! (`tests::what_is_saved_is_read_back`).
 
-use super::FileError;
-use super::output::keep;
-use super::plain::read_text;
+use crate::files::output::keep;
+use crate::files::{FileError, read_text};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::Path;

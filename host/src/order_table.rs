@@ -5,8 +5,7 @@
 //! else is an error that names its line
 //! (`tests::what_is_no_table_is_refused_in_one_line_that_names_the_place`).
 
-use super::FileError;
-use super::plain::read_text;
+use crate::files::{FileError, read_text};
 use std::path::Path;
 
 const EXPECTED: &str = "a text file of pattern numbers";

@@ -15,9 +15,9 @@
 //! | `support` | `(B, k)` int64: atoms in the order chosen; -1 where the search ended before |
 //! | `coef` | `(B, k)` float64: coefficient of each atom, 0 for an empty place |
 
-use super::FileError;
-use super::archive::{self, Archive, Numbers};
-use super::npy;
+use crate::files::FileError;
+use crate::files::archive::{self, Archive, Numbers};
+use crate::files::npy;
 use std::path::Path;
 
 /// Measurements, and the dictionary in which their sparse solution is sought.
@@ -116,21 +116,20 @@ pub fn encode(
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Zip, npy_f64, npy_i32, zip};
     use super::*;
 
     fn file(members: &[(&str, Vec<u8>)]) -> (tempfile::TempDir, std::path::PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("problem.npz");
-        std::fs::write(&path, zip(Zip::Deflated, members)).unwrap();
+        std::fs::write(&path, archive::encode(&path, members).unwrap()).unwrap();
         (folder, path)
     }
 
     fn members() -> Vec<(&'static str, Vec<u8>)> {
         vec![
-            ("D.npy", npy_f64("(2, 3)", &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
-            ("Y.npy", npy_f64("(2, 2)", &[1.0, 0.0, 0.0, 1.0])),
-            ("k.npy", npy_i32("()", &[2])),
+            ("D", npy::encode(&[2, 3], &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
+            ("Y", npy::encode(&[2, 2], &[1.0, 0.0, 0.0, 1.0])),
+            ("k", npy::encode(&[], &[2_i64])),
         ]
     }
 
@@ -151,14 +150,14 @@ mod tests {
             let (_folder, path) = file(&members);
             read(&path).unwrap_err().to_string()
         };
-        let text = refused(0, ("E.npy", npy_f64("(1,)", &[1.0])));
+        let text = refused(0, ("E", npy::encode(&[1], &[1.0])));
         assert!(text.contains("no `D`") && text.contains("D, Y and k"), "{text}");
-        let text = refused(1, ("Y.npy", npy_f64("(3,)", &[1.0; 3])));
+        let text = refused(1, ("Y", npy::encode(&[3], &[1.0; 3])));
         assert!(text.contains("`Y` has shape (3,)") && text.contains("(B, 2)"), "{text}");
-        let text = refused(1, ("Y.npy", npy_f64("(2, 2)", &[1.0, 1.0, f64::NAN, 1.0])));
+        let text = refused(1, ("Y", npy::encode(&[2, 2], &[1.0, 1.0, f64::NAN, 1.0])));
         assert!(text.contains("`Y` is NaN at [1, 0]"), "{text}");
-        for k in [0, 4] {
-            let text = refused(2, ("k.npy", npy_i32("()", &[k])));
+        for k in [0_i64, 4] {
+            let text = refused(2, ("k", npy::encode(&[], &[k])));
             assert!(text.contains(&format!("`k` is {k}")) && text.contains("1 to 3"), "{text}");
         }
     }
