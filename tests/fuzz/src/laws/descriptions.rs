@@ -3,8 +3,8 @@
 use crate::{Law, MIB, place, read, seeds};
 use nirspi::calibration::{KeptCalibration, KeptFlatField};
 use nirspi::order_table::read_order_table;
-use nirspi::settings::{Options, Takes, from_file};
 use nirspi::response::Settling;
+use nirspi::settings::{Options, Takes, from_file};
 use nirspi_optics::CameraModel;
 use nirspi_recon::{Order, Side};
 use nirspi_virtual::read_camera_model;
