@@ -3,59 +3,29 @@
 
 use super::delays::Passed;
 use super::line::Line;
-use super::look::{Look, Measured, MeasuredError};
+use super::look::{Look, Measured};
 use super::moving::Moving;
 #[cfg(feature = "server")]
 use super::own::OwnImages;
-use super::picture::{Enhancement, Picture};
+use super::picture::{CHOSEN_EVERY, Enhancement, Picture, PictureError, made_of, ms_since};
 use super::settings::{Offer, Settings, alternatives};
 use super::state::{Light, Offered, Published, Rate, Rates, State};
 use super::{Shared, lock};
 use nirspi::calibration::FlatField;
 use nirspi::causes;
-use nirspi::clock::{self, Instant};
+use nirspi::clock::Instant;
 use nirspi::imaging::{
-    Enhance, EnhanceError, ImageContext, KnownReadings, MethodReport, SteadyWhite, Warning, White,
-    enhance_frame,
+    Enhance, ImageContext, KnownReadings, MethodReport, SteadyWhite, Warning, White, enhance_frame,
 };
 use nirspi_nets::deblur::{self, Model};
 use nirspi_nets::{Device, Method as Network, Networks, WeightsError};
-#[cfg(feature = "server")]
-use nirspi_recon::reconstruct::MatrixError;
 use nirspi_recon::reconstruct::{
     Method, MethodSettings, Reconstruct, ReconstructError, Reconstruction, Report, Setting,
     Stacked, Strength,
 };
-use nirspi_recon::{Image, Measurements, Shape, Side};
+use nirspi_recon::{Measurements, Side};
 use std::sync::{Arc, Mutex};
 use thiserror::Error;
-
-/// Why the newest frames gave no picture.
-#[derive(Debug, Error)]
-pub(super) enum PictureError {
-    /// The settings name a method that does not exist.
-    #[error("there is no method {0}")]
-    Method(&'static str),
-    /// The frames give no measurements.
-    #[error(transparent)]
-    Measurements(#[from] MeasuredError),
-    /// The method gives no image.
-    #[error(transparent)]
-    Reconstruct(#[from] ReconstructError),
-    /// The patterns of a feed, or a setting, give no image.
-    #[cfg(feature = "server")]
-    #[error(transparent)]
-    Matrix(#[from] MatrixError),
-    /// The image has a pixel that is not finite.
-    #[error("the frames gave no image of finite numbers")]
-    NotFinite,
-    /// The weights of the network are damaged.
-    #[error(transparent)]
-    Weights(#[from] WeightsError),
-    /// The networks refuse the image.
-    #[error(transparent)]
-    Enhance(#[from] EnhanceError),
-}
 
 /// Why methods and networks cannot be prepared.
 #[derive(Debug, Error)]
@@ -92,10 +62,6 @@ pub struct Imaging {
     /// The learned stages with the network of this name.
     enhance: (&'static str, Enhance),
 }
-
-/// Number of pictures after which a method that chooses among others chooses again: some seconds of a
-/// live view.
-pub(super) const CHOSEN_EVERY: u32 = 100;
 
 /// These settings with the strength that a page chose; without one, it is chosen by held-back
 /// measurements.
@@ -442,47 +408,6 @@ impl Imaging {
     }
 }
 
-/// The picture of an image, without what networks and Hadamard patterns add.
-pub(super) fn made_of(
-    look: &Look,
-    settings: &Settings,
-    shared: &Shared,
-    image: &Image<impl Shape>,
-    white_counts: f32,
-    reconstruct_ms: f64,
-) -> Picture {
-    let (order, patterns, sweeps) = look.patterns();
-    Picture {
-        number: shared.slot.ledger().images.shown + 1,
-        counts: image.pixels().to_vec(),
-        enhanced: None,
-        half_width: None,
-        readings: None,
-        depth: look.depth().cloned(),
-        #[cfg(feature = "server")]
-        arrived: look.arrived,
-        arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed())).as_millis()
-            as u64,
-        method: settings.method,
-        n: None,
-        height: image.size().height(),
-        width: image.size().width(),
-        unit: look.unit(),
-        order,
-        patterns,
-        sweeps,
-        run_frames: look.counters,
-        past: None,
-        frames: look.frames(),
-        white_counts,
-        reconstruct_ms,
-        enhancement: None,
-        warnings: Vec::new(),
-        frame_warnings: Vec::new(),
-        short_warnings: Vec::new(),
-    }
-}
-
 /// The measurements by Hadamard row; NaN for a row that was not measured.
 fn readings(measurements: &Measurements) -> Vec<f32> {
     let mut readings = vec![f32::NAN; measurements.side().area()];
@@ -490,8 +415,4 @@ fn readings(measurements: &Measurements) -> Vec<f32> {
         readings[row as usize] = value as f32;
     }
     readings
-}
-
-pub(super) fn ms_since(started: Instant) -> f64 {
-    started.elapsed().as_secs_f64() * 1e3
 }

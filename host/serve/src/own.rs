@@ -1,8 +1,7 @@
 //! The pictures of a feed of its own patterns.
 
-use super::imaging::{CHOSEN_EVERY, PictureError, made_of, ms_since};
 use super::look::Look;
-use super::picture::Picture;
+use super::picture::{CHOSEN_EVERY, Picture, PictureError, made_of, ms_since};
 use super::settings::Settings;
 use super::{Passed, Shared};
 use nirspi::clock::Instant;

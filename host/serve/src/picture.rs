@@ -1,13 +1,19 @@
 //! The images that a page shows, and what it says of them.
 
-use super::look::DepthImage;
+use super::Shared;
+use super::look::{DepthImage, Look, MeasuredError};
+use super::settings::Settings;
 use nirspi::account::LossCounters;
-#[cfg(fuzzing)]
-use nirspi::clock;
-#[cfg(any(fuzzing, feature = "server"))]
-use nirspi::clock::Instant;
+use nirspi::clock::{self, Instant};
+use nirspi::imaging::EnhanceError;
+use nirspi_nets::WeightsError;
+#[cfg(feature = "server")]
+use nirspi_recon::reconstruct::MatrixError;
+use nirspi_recon::reconstruct::ReconstructError;
+use nirspi_recon::{Image, Shape};
 use serde::Serialize;
 use std::sync::Arc;
+use thiserror::Error;
 
 /// The images of one state, and their properties.
 #[derive(Debug, Serialize)]
@@ -79,6 +85,82 @@ impl Picture {
         let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
         self.counts.iter().map(|value| (value * scale).clamp(0.0, 1.0)).collect()
     }
+}
+
+/// Why the newest frames gave no picture.
+#[derive(Debug, Error)]
+pub(super) enum PictureError {
+    /// The settings name a method that does not exist.
+    #[error("there is no method {0}")]
+    Method(&'static str),
+    /// The frames give no measurements.
+    #[error(transparent)]
+    Measurements(#[from] MeasuredError),
+    /// The method gives no image.
+    #[error(transparent)]
+    Reconstruct(#[from] ReconstructError),
+    /// The patterns of a feed, or a setting, give no image.
+    #[cfg(feature = "server")]
+    #[error(transparent)]
+    Matrix(#[from] MatrixError),
+    /// The image has a pixel that is not finite.
+    #[error("the frames gave no image of finite numbers")]
+    NotFinite,
+    /// The weights of the network are damaged.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
+    /// The networks refuse the image.
+    #[error(transparent)]
+    Enhance(#[from] EnhanceError),
+}
+
+/// Number of pictures after which a method that chooses among others chooses again: some seconds of a
+/// live view.
+pub(super) const CHOSEN_EVERY: u32 = 100;
+
+/// The picture of an image, without what networks and Hadamard patterns add.
+pub(super) fn made_of(
+    look: &Look,
+    settings: &Settings,
+    shared: &Shared,
+    image: &Image<impl Shape>,
+    white_counts: f32,
+    reconstruct_ms: f64,
+) -> Picture {
+    let (order, patterns, sweeps) = look.patterns();
+    Picture {
+        number: shared.slot.ledger().images.shown + 1,
+        counts: image.pixels().to_vec(),
+        enhanced: None,
+        half_width: None,
+        readings: None,
+        depth: look.depth().cloned(),
+        #[cfg(feature = "server")]
+        arrived: look.arrived,
+        arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed())).as_millis()
+            as u64,
+        method: settings.method,
+        n: None,
+        height: image.size().height(),
+        width: image.size().width(),
+        unit: look.unit(),
+        order,
+        patterns,
+        sweeps,
+        run_frames: look.counters,
+        past: None,
+        frames: look.frames(),
+        white_counts,
+        reconstruct_ms,
+        enhancement: None,
+        warnings: Vec::new(),
+        frame_warnings: Vec::new(),
+        short_warnings: Vec::new(),
+    }
+}
+
+pub(super) fn ms_since(started: Instant) -> f64 {
+    started.elapsed().as_secs_f64() * 1e3
 }
 
 #[cfg(fuzzing)]
