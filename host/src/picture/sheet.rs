@@ -12,7 +12,6 @@ use super::scale::{Range, Scale, Unit};
 use super::signature::{MARGIN, signed};
 use super::text::{Block, Style};
 use super::ticks::number;
-use super::video::MOST_BESIDE;
 use crate::files::image::{encode_labelled, to_level};
 use crate::provenance::Provenance;
 use rayon::prelude::*;
@@ -24,6 +23,8 @@ const TILE: u32 = 96;
 const COLUMNS: usize = 8;
 /// The most images in the picture.
 const MOST: usize = 64;
+/// The most images of a video beside it, which must not delay other results.
+pub(super) const MOST_BESIDE: usize = 100;
 const GAP: u32 = 10;
 /// The grey bar is at most so wide.
 const BAR: u32 = 512;

@@ -8,7 +8,7 @@ use super::drawing::Drawing;
 use super::layout::{Panel, SideBySide};
 use super::look::{FigureStyle, Look};
 use super::scale::{Range, Unit};
-use super::sheet::{Sheet, evenly};
+use super::sheet::{MOST_BESIDE, Sheet, evenly};
 use super::signature::signed;
 use crate::files::image::sign;
 use crate::provenance::Provenance;
@@ -18,8 +18,6 @@ use rayon::prelude::*;
 
 /// The most frames of a video that is made for itself.
 const MOST: usize = 1000;
-/// The most frames of a video beside other results, which it must not delay.
-pub(super) const MOST_BESIDE: usize = 100;
 /// Frames that are drawn at a time, on all processors.
 const TOGETHER: usize = 64;
 /// Frames a second.

@@ -8,6 +8,7 @@ mod one;
 mod own;
 mod pipeline;
 mod pipeline_error;
+mod result_folder;
 mod said;
 mod solver;
 mod stack;
@@ -19,8 +20,9 @@ pub use one::{DropoutReport, LampReport, OneReport};
 pub use own::{
     OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, matrix_doubts, own_image,
 };
-pub use pipeline::{Pipeline, ResultFolder};
+pub use pipeline::Pipeline;
 pub use pipeline_error::PipelineError;
+pub use result_folder::ResultFolder;
 pub use said::{AllSaid, Kind, Said};
 pub use solver::{
     Recipe, Solved, Solver, SolverError, check_finite, not_read_words, own_atoms, read_atoms,

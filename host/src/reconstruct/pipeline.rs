@@ -22,15 +22,13 @@ use super::many::{FileImage, Part, file_images, many_images};
 use super::one::{OneReport, one_image};
 use super::pipeline_error::PipelineError;
 use super::stack::{StackReport, Step, Watch, Writing};
-use super::{Networks, NetworksError, Solver, SolverError};
-use crate::picture::FigureStyle;
-use crate::provenance::Made;
+use super::{Networks, NetworksError, ResultFolder, Solver, SolverError};
 use crate::source::{Source, SourceOptions, Sources};
 use crate::stage_times::StageTimes;
 use nirspi_recon::Backend;
 use nirspi_recon::reconstruct::{AT_A_TIME, ReconstructError};
 use nirspi_recon::words::count_of;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Files that are read together, on all processors.
@@ -40,33 +38,6 @@ const FILES_AT_A_TIME: usize = 256;
 pub struct Pipeline {
     solver: Solver,
     networks: Option<Networks>,
-}
-
-/// Where results go, and what is said of them.
-pub struct ResultFolder<'r> {
-    /// The file or folder of the measurements, or the first of several files, for the report.
-    pub input: &'r Path,
-    /// The same in words, above the pictures of a stack.
-    pub named: String,
-    /// Whether there are several files, which the report of a stack then names.
-    pub many: bool,
-    /// Whether each frame of a stack starts from the frames before.
-    pub warm_start: bool,
-    /// The folder.
-    pub out: &'r Path,
-    /// The program, for the provenance of the results.
-    pub made: &'r Made,
-    /// What the pictures are made for.
-    pub figure: FigureStyle,
-}
-
-impl<'r> ResultFolder<'r> {
-    /// Results of one file.
-    #[must_use]
-    pub fn of_file(input: &'r Path, out: &'r Path, made: &'r Made, figure: FigureStyle) -> Self {
-        let named = input.display().to_string();
-        Self { input, named, many: false, warm_start: false, out, made, figure }
-    }
 }
 
 impl Pipeline {
