@@ -242,8 +242,10 @@ impl Several {
     }
 
     /// Every measurement, as it is read.
-    #[cfg(test)]
-    fn each(&mut self) -> Result<Vec<MeasurementFile>, FileError> {
+    ///
+    /// # Errors
+    /// As [`read`], of the first measurement that is refused.
+    pub fn each(&mut self) -> Result<Vec<MeasurementFile>, FileError> {
         self.some(0..self.len(), Ok)?.into_iter().collect()
     }
 

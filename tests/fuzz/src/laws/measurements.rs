@@ -5,10 +5,10 @@ use nirspi::files::measurement::{
     self, MeasurementFile, PatternSelection, Plain, Readings, Selection, Several, read_images_of,
     read_plain, read_plain_all,
 };
+use nirspi::files::npy;
 use nirspi::files::output::Existing;
 use nirspi::files::table::Table;
 use nirspi::files::trace::{self, Cut, Raw};
-use nirspi::files::{FileError, npy};
 use nirspi::problem;
 use nirspi_recon::{Measurements, Order, Rows, Side, Size};
 use std::io::{Cursor, Write};
@@ -179,7 +179,7 @@ fn one_file(path: &Path, want: &Selection) {
         return;
     };
     let (count, patterns) = (several.len(), several.patterns());
-    let all = several.each(Ok::<_, FileError>).map_err(|error| crate::refused(&error));
+    let all = several.each().map_err(|error| crate::refused(&error));
     let index = want.index.or((count == 1).then_some(0)).filter(|index| *index < count);
     assert!(file.is_none() || index.is_some(), "read one of several measurements without an index");
     if let (Ok(all), Some(index)) = (&all, index) {
