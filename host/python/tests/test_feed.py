@@ -177,7 +177,12 @@ def test_patterns_of_ones_own_give_readings_for_a_matrix(tmp_path):
         feed.record(tmp_path / "rec.npz")
     assert np.array_equal(np.load(tmp_path / "rec.npz")["y"], [y])
     np.save(tmp_path / "masks.npy", masks)
-    shown = {"matrix": tmp_path / "masks.npy", "method": "pseudo-inverse", "listen": "127.0.0.1:0", "wait": False}
+    shown = {
+        "matrix": tmp_path / "masks.npy",
+        "method": "pseudo-inverse",
+        "listen": "127.0.0.1:0",
+        "wait": False,
+    }
     with ns.serve([y], size=(4, 6), patterns=60, readings="single", **shown) as page:
         state(page.url, lambda state: state["picture"])
         assert np.allclose(np.load(io.BytesIO(get(page.url, "/image.npy"))), scene, atol=1e-4)

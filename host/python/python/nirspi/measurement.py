@@ -239,7 +239,8 @@ class Measurement:
             Samples of a pattern. With a trigger, its edges must show this number.
         trigger : str, optional
             The field with the trigger's samples: a pattern begins where it rises through the middle of
-            its range, with ``NAME:fall`` where it falls, with ``NAME:both`` at every change. One of ``samples`` and ``trigger`` is needed.
+            its range, with ``NAME:fall`` where it falls, with ``NAME:both`` at every change. One of
+            ``samples`` and ``trigger`` is needed.
         field : str, optional
             The field with the detector's samples, of a file with several.
         skip : int
