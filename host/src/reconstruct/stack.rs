@@ -389,6 +389,8 @@ impl<'r> ForNetworks<'r> {
         for of_file in alike.chunk_by(|a, b| a.file == b.file) {
             let levels = of_file.iter().flat_map(|alike| alike.levels.iter().copied());
             let white = White::median(levels);
+            let in_file: usize = of_file.iter().map(|alike| alike.levels.len()).sum();
+            let start = of_file[0].first;
             for alike in of_file {
                 let mut bytes = vec![0; 4 * alike.side.area()];
                 let mut number = alike.first;
@@ -405,8 +407,10 @@ impl<'r> ForNetworks<'r> {
                     let images: Vec<Image> = read.collect::<io::Result<_>>().map_err(wrong)?;
                     let images: Vec<&Image> = images.iter().collect();
                     let results = networks.enhance(&mut turns, &images, &alike.rows, white)?;
-                    for (at, (sharp, report)) in results.into_iter().enumerate() {
-                        made.push(number + at, alike, &sharp, &report).map_err(wrong)?;
+                    for (number, (sharp, report)) in (number..).zip(results) {
+                        let index = (in_file > 1).then_some(number - start);
+                        let of = || (alike.file.clone(), index);
+                        made.push(number, of, &sharp, &report).map_err(wrong)?;
                     }
                     number += some;
                 }
@@ -424,7 +428,7 @@ impl Enhanced<'_> {
     fn push(
         &mut self,
         number: usize,
-        alike: &Alike,
+        of: impl Fn() -> (PathBuf, Option<usize>),
         sharp: &[f32],
         report: &FrameReport,
     ) -> io::Result<()> {
@@ -432,7 +436,7 @@ impl Enhanced<'_> {
             self.warned.push(number);
         }
         for warning in &report.warnings {
-            self.said.add(Kind::Warning, warning, number, || (alike.file.clone(), Some(number)));
+            self.said.add(Kind::Warning, warning, number, &of);
         }
         self.reports.push(report)?;
         self.pixels.push(sharp)

@@ -76,6 +76,12 @@ fn a_file_of_several_and_a_recording_give_each_measurement_or_their_sum() {
         frames.as_array().unwrap().iter().map(|frame| frame["index"].as_u64().unwrap()).collect();
     assert_eq!(index, [0, 1, 2, 0, 1, 2]);
     assert_eq!(bench.json("all/report.json")["provenance"]["origin"], "simulated");
+    // A warning names the first image that it is about, and says how many more.
+    let sharp = bench.run(&[&all[..5], &["--enhance", "--out", "sharp"]].concat());
+    assert!(sharp.stderr.contains("warning: rec.mcap, 0 and "), "{}", sharp.stderr);
+    std::fs::copy(bench.path("rec.mcap"), bench.path("same.mcap")).unwrap();
+    let sharp = bench.run(&["reconstruct", "rec.mcap", "same.mcap", "--enhance", "--out", "two"]);
+    assert!(sharp.stderr.contains("warning: rec.mcap and 1 more: "), "{}", sharp.stderr);
 }
 
 #[test]
