@@ -117,7 +117,7 @@ impl Imaging {
     /// without networks, which know Hadamard patterns only.
     ///
     /// # Errors
-    /// [`ImagingError::Method`] if this method is none of them.
+    /// [`ImagingError::Method`] if the method needs Hadamard rows.
     #[cfg(feature = "server")]
     pub fn of_own_patterns(mut self, method: Method) -> Result<Self, ImagingError> {
         self.own = Some(OwnImages::new(method, &self.settings)?);

@@ -188,7 +188,7 @@ fn grey(
     };
     if smooth {
         let image: ImageBuffer<Luma<u8>, _> = ImageBuffer::from_raw(columns, rows, levels.to_vec())
-            .expect("an image has rows of so many columns");
+            .expect("the levels are whole rows");
         let shown = imageops::resize(&image, wide, high, FilterType::Triangle);
         shown.enumerate_pixels().for_each(|(x, y, Luma([level]))| put(x, y, *level));
         return;

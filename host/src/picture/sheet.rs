@@ -299,7 +299,7 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// The numbers of the images of so many that a sheet and a video beside it show.
+/// The numbers of the images that a sheet of `count` images, and a video beside it, show.
 #[must_use]
 pub fn chosen(count: usize) -> Vec<usize> {
     let mut numbers = [evenly(count, MOST), evenly(count, MOST_BESIDE)].concat();

@@ -54,7 +54,7 @@ impl FrameReports {
         self.count
     }
 
-    /// Whether there is none.
+    /// Whether there is no report.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0

@@ -112,7 +112,7 @@ impl<'a> Frames<'a> {
                 Err(Ended::Recording(problem)) => Err(problem.into()),
                 Err(Ended::NotWanted) => return,
             };
-            // Whoever has gone does not need the last ones.
+            // A reader that has stopped needs no last batch.
             let _ = to.send(last);
         };
         thread::Builder::new()

@@ -31,12 +31,6 @@ impl Growing {
         Ok(Self { name: name.to_owned(), beginning, file, staged, hasher, bytes: 0 })
     }
 
-    /// The name of the file.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
     /// Reads again what was written: bytes after the beginning, from `from` on.
     ///
     /// # Errors

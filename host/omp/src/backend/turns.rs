@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A device that refuses so few items gets no more.
+/// A device that cannot do this number of items gets none after that.
 const FEWEST: usize = 16;
 
 /// The fewest items by which a device and the processor are compared.
@@ -18,7 +18,7 @@ const COMPARED: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Who {
     Processor,
-    /// The device, at most so many items at a time.
+    /// The device; the number is the most items that it gets at a time.
     Device(usize),
     /// The first batch decides.
     Undecided,
@@ -82,8 +82,9 @@ impl Turns {
         self.said.as_ref()
     }
 
-    /// Does so many items; of the results, the first ones of the returned number are the device's. `device` and `processor` do
-    /// a range of them. Where the device fails, it gets half as many, and the processor what it cannot do.
+    /// Does all items, and returns their results and how many of them, the first ones, are the device's. `device` and
+    /// `processor` each do the items of a range. A device that fails gets half as many items the next time, and the
+    /// processor does what the device cannot.
     ///
     /// # Errors
     /// Those of `processor`, and those of `device` that are not [its own failures](Failure).

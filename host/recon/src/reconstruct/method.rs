@@ -207,7 +207,7 @@ impl Method {
     /// The settings of the method for a user's own patterns.
     ///
     /// # Errors
-    /// [`ReconstructError::NeedsRows`] if there is none.
+    /// [`ReconstructError::NeedsRows`] if the method needs Hadamard rows.
     pub fn matrix_settings(
         self,
         settings: &MethodSettings,

@@ -27,8 +27,8 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// Measurements that are looked at together. More give the images of one stack after another, so a caller may give
-/// so many at a time.
+/// Measurements that are looked at together. A longer stack is made in parts of this number, so a
+/// caller who gives parts of this number gets the same images.
 pub const AT_A_TIME: usize = 4096;
 
 /// The fewest measurements that are a kind.
