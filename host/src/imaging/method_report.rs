@@ -104,7 +104,8 @@ impl Serialize for MethodReport {
 /// What held-back readings say of the image.
 #[derive(PartialEq, Serialize)]
 struct HeldBackReport {
-    /// Absolute and squared error of the predictions, each relative to zero filling's; 2 is as bad.
+    /// Sum of the absolute and of the squared error of the predictions, each as a share of that of zeros: 2 is no better
+    /// than zeros.
     error: f64,
     /// Share of the readings' variation that the predictions explain.
     confirmed_share: f64,
@@ -118,36 +119,52 @@ impl From<HeldBack> for HeldBackReport {
     }
 }
 
+/// How the method made the image, as far as it says.
 #[derive(Default, PartialEq, Serialize)]
 struct Details<'r> {
+    /// The basis of the image's coefficients, or the file of a user's own atoms.
     #[serde(skip_serializing_if = "Option::is_none")]
     basis: Option<&'r str>,
+    /// What computed: `cpu`, or a GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
     backend: Option<&'static str>,
+    /// The GPU's name.
     #[serde(skip_serializing_if = "Option::is_none")]
     device: Option<&'r str>,
+    /// Why this device computed, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     computed: Option<&'r str>,
+    /// Strength of the penalty.
     #[serde(skip_serializing_if = "Option::is_none")]
     strength: Option<f64>,
+    /// Number of atoms.
     #[serde(skip_serializing_if = "Option::is_none")]
     sparsity: Option<usize>,
+    /// Mean weight of the readings against the method's predictions of them: 1 where there is no noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     weight_of_readings: Option<f64>,
+    /// The method that was chosen by held-back readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     chosen: Option<&'static str>,
+    /// What held-back readings say.
     #[serde(skip_serializing_if = "Option::is_none")]
     held_back: Option<HeldBackReport>,
+    /// Why the pursuit stopped.
     #[serde(skip_serializing_if = "Option::is_none")]
     stop: Option<&'static str>,
+    /// Norm of the residual of the image, relative to the norm of the readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     relative_residual: Option<f64>,
+    /// Atoms that no pattern sees.
     #[serde(skip_serializing_if = "Option::is_none")]
     unseen_atoms: Option<usize>,
+    /// Weight of the network's prediction, from 0 to 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     trust_in_prediction: Option<f64>,
+    /// Standard deviation of the noise of a measurement, in the readings' units.
     #[serde(skip_serializing_if = "Option::is_none")]
     noise_of_a_measurement: Option<f64>,
+    /// What else there is to say, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     note: Option<&'r str>,
 }

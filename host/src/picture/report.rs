@@ -32,14 +32,16 @@ pub struct Pictures {
 
 #[derive(Debug, Clone, Serialize)]
 struct Entry {
+    /// Name of the file.
     file: String,
-    /// Number of images in the file, and of those that there are.
+    /// Number of images in the file.
     shown: usize,
+    /// Number of images that there are.
     of: usize,
     /// The percentiles that are black and white, if an image is stretched.
     #[serde(skip_serializing_if = "Option::is_none")]
     percentiles: Option<[f64; 2]>,
-    /// A range for each image, or one for all.
+    /// What is black and white: for each image, or once for all.
     images: Vec<Shown>,
     /// The picture, then the same in other formats: names and bytes.
     #[serde(skip)]
@@ -48,6 +50,7 @@ struct Entry {
 
 #[derive(Debug, Clone, Serialize)]
 struct Shown {
+    /// The title above the image.
     #[serde(skip_serializing_if = "String::is_empty")]
     title: String,
     #[serde(flatten)]

@@ -43,6 +43,7 @@ mod reconstruct;
 // The page is of a build with the default features.
 #[cfg(all(feature = "gpu", not(feature = "flash")))]
 mod reference;
+mod report_page;
 mod selftest;
 #[cfg(unix)]
 mod serial;
