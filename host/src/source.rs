@@ -32,7 +32,7 @@ mod several;
 
 pub use batches::{Batches, Sources};
 use recording::from_recording;
-pub(crate) use recording::of_sum;
+pub(crate) use recording::{Frames, Stamp};
 pub use several::Several;
 
 /// How to read measurements.

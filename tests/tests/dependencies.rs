@@ -281,3 +281,52 @@ fn modules_of_a_crate_use_each_other_in_one_direction() {
     }
     assert!(found.is_empty(), "a module belongs below those that use it:\n{}", found.join("\n"));
 }
+
+/// Who calls a method of reconstruction, and why it is no caller of `nirspi::reconstruct`, which makes the images of files,
+/// recordings and exports.
+const CALLERS: [(&str, &str); 10] = [
+    ("host/eval/src/completion.rs", "judges methods"),
+    ("host/eval/src/sampling.rs", "judges methods"),
+    ("host/eval/src/trust/shots.rs", "judges methods"),
+    ("host/eval/src/video.rs", "judges methods"),
+    ("host/lesson/src/lesson.rs", "shows one number at a time, in a browser"),
+    ("host/python/src/reconstruct.rs", "images of NumPy's arrays"),
+    ("host/serve/src/imaging.rs", "pages change the method from picture to picture"),
+    ("host/serve/src/own.rs", "the same with patterns of a user's own"),
+    ("host/src/inspect/trial.rs", "tries forms of readings"),
+    ("host/virtual/src/look.rs", "a simulated scene in shares of its white sheet"),
+];
+
+/// Files in which a method is made ready to be called, without tests, and without the crates of the methods.
+fn callers(folder: &Path, found: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = entry.file_name().unwrap().to_string_lossy();
+        let left_out =
+            ["tests", "tests.rs", "benches", "examples", "target", "recon", "omp", "nets"];
+        if left_out.contains(&&*name) || entry.is_symlink() {
+            continue;
+        }
+        if entry.is_dir() {
+            callers(&entry, found);
+        } else if name.ends_with(".rs") {
+            let text = std::fs::read_to_string(&entry).unwrap();
+            let code = text.split("#[cfg(test)]").next().unwrap();
+            let calls = |line: &str| {
+                !line.trim_start().starts_with("//")
+                    && (line.contains("ethod.prepare(") || line.contains("OwnMatrix::new("))
+            };
+            if code.lines().any(calls) {
+                found.push(entry.strip_prefix(root()).unwrap().display().to_string());
+            }
+        }
+    }
+}
+
+#[test]
+fn images_are_made_in_one_place_and_by_those_who_cannot_use_it() {
+    let mut found = Vec::new();
+    callers(&root().join("host"), &mut found);
+    found.retain(|file| !file.starts_with("host/src/reconstruct/"));
+    found.sort();
+    assert_eq!(found, CALLERS.map(|(file, _)| file));
+}

@@ -31,7 +31,7 @@ pub struct Integrated {
 
 /// Number of frames that are kept alone, for a scene that moves: at 24 pictures a second and frames of 1.5 ms, those of one
 /// picture.
-pub(crate) const NEWEST: usize = 28;
+pub const NEWEST: usize = 28;
 
 /// What the frames of a run tell together, and one of them alone does not.
 #[derive(Debug, Clone, Default)]

@@ -28,7 +28,7 @@ use super::interrupt::Noted;
 use earlier::{Content, Earlier};
 pub use growing::Growing;
 #[cfg(not(target_family = "wasm"))]
-pub(crate) use spool::Spool;
+pub use spool::Spool;
 use std::fs;
 use std::io::{self, BufWriter, IntoInnerError, Write};
 use std::path::{Path, PathBuf};

@@ -7,12 +7,13 @@ use crate::files::measurement::{NOISE, PROVENANCE};
 use crate::files::npy::{Element, encode, encode_text, header};
 use crate::files::output::{Existing, write_in_pieces, write_result};
 use crate::provenance::Provenance;
+use crate::source::Stamp;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a `.npz` file.
 pub(super) fn npz(
-    whole: &Whole,
+    whole: &Whole<'_>,
     out: &Path,
     existing: Existing<'_>,
     provenance: &Provenance,
@@ -20,26 +21,31 @@ pub(super) fn npz(
     write_members(out, existing, |zip| {
         let rows = whole.source.measurements.rows();
         let h_row: Vec<i64> = rows.iter().map(|&row| row.into()).collect();
-        let [m, count] = [h_row.len(), whole.frames()];
+        let m = h_row.len();
         zip.add("n", &encode(&[], &[rows.side().pixels() as i64]))?;
         zip.add("h_row", &encode(&[m], &h_row))?;
         zip.add("d", &encode(&[m], whole.source.measurements.values()))?;
         if let Some(noise) = whole.source.measurements.noise() {
             zip.add(NOISE, &encode(&[], &[noise]))?;
         }
-        zip.add("sequence", &encode(&[count], &whole.sequence))?;
-        zip.add("device_time_us", &encode(&[count], &whole.device_time_us))?;
-        zip.add("time_ns", &encode(&[count], &whole.time_ns))?;
         zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
         zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
         zip.begin("frames")?;
-        frames(whole, |bytes| zip.write(bytes))
+        let stamps = frames(whole, |bytes| zip.write(bytes))?;
+        let mut add = |name: &str, of: fn(&Stamp) -> i64| {
+            let all: Vec<i64> = stamps.iter().map(of).collect();
+            zip.add(name, &encode(&[all.len()], &all))
+        };
+        add("sequence", |stamp| stamp.sequence)?;
+        add("device_time_us", |stamp| stamp.device_time_us as i64)?;
+        add("time_ns", |stamp| stamp.time_ns as i64)?;
+        Ok(())
     })
 }
 
 /// Writes the readings of each frame as one array (F, M), and the provenance into a file beside it.
 pub(super) fn npy(
-    whole: &Whole,
+    whole: &Whole<'_>,
     out: &Path,
     existing: Existing<'_>,
     provenance: &Provenance,
@@ -50,6 +56,7 @@ pub(super) fn npy(
         frames(whole, |bytes| {
             file.write_all(bytes).map_err(|error| FileError::io(out, "write", error))
         })
+        .map(|_| ())
     })?;
     let text = provenance.sign(&serde_json::json!({})).unwrap_or_default();
     Ok(write_result(&beside, existing, text.as_bytes())?)
@@ -62,26 +69,28 @@ fn beside(out: &Path) -> PathBuf {
     name.into()
 }
 
-/// Hands out the bytes of a `.npy` file of all frames, piece by piece.
+/// Hands out the bytes of a `.npy` file of all frames, piece by piece. Returns their numbers and times.
 fn frames(
-    whole: &Whole,
+    whole: &Whole<'_>,
     mut write: impl FnMut(&[u8]) -> Result<(), FileError>,
-) -> Result<(), ExportError> {
-    let shape = [whole.frames(), whole.source.measurements.rows().len()];
+) -> Result<Vec<Stamp>, ExportError> {
+    let shape = [whole.frames.len(), whole.source.measurements.rows().len()];
     write(&header::<f64>(&shape))?;
-    let mut bytes = Vec::new();
-    whole.each(|_, measurements| {
+    let (mut bytes, mut stamps) = (Vec::new(), Vec::new());
+    whole.each(|stamp, measurements| {
+        stamps.push(stamp);
         bytes.clear();
         measurements.values().iter().for_each(|value| value.append(&mut bytes));
-        Ok(write(&bytes)?)
-    })
+        write(&bytes)
+    })?;
+    Ok(stamps)
 }
 
 /// Writes the mean of all frames, one pattern a line, under the heading `n,h_row,d,noise`, without
 /// `noise` if that is not known. The numbers
 /// read back as they were. Comments before the heading have the provenance.
 pub(super) fn csv(
-    whole: &Whole,
+    whole: &Whole<'_>,
     out: &Path,
     existing: Existing<'_>,
     provenance: &Provenance,
@@ -92,8 +101,10 @@ pub(super) fn csv(
         let lines = measurements.rows().iter().zip(measurements.values());
         let write = || -> io::Result<()> {
             let what = if whole.is_simulated() { ", simulated" } else { "" };
-            writeln!(file, "# mean of {} frames, ADC counts{what}", whole.frames())?;
+            writeln!(file, "# mean of {} frames, ADC counts{what}", whole.frames.len())?;
             writeln!(file, "# {PROVENANCE}: {}", provenance.json())?;
+            // Such as that the mean is one of the newest frames alone.
+            whole.source.notes.iter().try_for_each(|note| writeln!(file, "# note: {note}"))?;
             // The noise of `d` is the same for all.
             let noise = measurements.noise().map(|noise| format!(",{noise:?}"));
             let (heading, noise) = match &noise {

@@ -5,25 +5,24 @@
 //! An exported file holds the numbers that `reconstruct` uses: the image of the exported file is
 //! the image of the recording before the flat field, to the bit
 //! (`an_exported_file_gives_the_image_of_the_recording_to_the_bit` in `host/tests/export.rs`).
-//! Frames are read one by one, so memory does not grow with the readings of a recording.
+//! Frames are read some at a time, so memory does not grow with the readings of a recording.
 
 mod arrays;
-#[cfg(feature = "enhance")]
-mod enhancing;
+#[cfg(all(feature = "enhance", feature = "pictures"))]
+mod images;
+#[cfg(all(feature = "enhance", feature = "pictures"))]
 mod mcap;
-#[cfg(feature = "pictures")]
+#[cfg(all(feature = "enhance", feature = "pictures"))]
 mod video;
 
 use crate::files::FileError;
 use crate::files::output::Existing;
-use crate::integrate::{IntegrateError, Integrated, KnownOfRun};
 use crate::provenance::Made;
-use crate::recording::{Recording, RecordingError, hear_recording};
-use crate::setup::MeasurementSetup;
-use crate::source::{self, Source, SourceError, SourceOptions};
+use crate::recording::RecordingError;
+use crate::source::{Frames, Source, SourceError, SourceOptions, Stamp};
 use nirspi_optics::CameraModel;
 use nirspi_recon::Measurements;
-use nirspi_recon::reconstruct::ReconstructError;
+use nirspi_recon::reconstruct::AT_A_TIME;
 use nirspi_recon::words::count;
 use serde::Serialize;
 use std::fmt;
@@ -42,9 +41,10 @@ pub enum Format {
     /// A table for spreadsheets.
     Csv,
     /// A recording with images, for viewers of MCAP files.
+    #[cfg(all(feature = "enhance", feature = "pictures"))]
     Mcap,
     /// A video.
-    #[cfg(feature = "pictures")]
+    #[cfg(all(feature = "enhance", feature = "pictures"))]
     Apng,
 }
 
@@ -54,8 +54,9 @@ impl Format {
         Self::Npz,
         Self::Npy,
         Self::Csv,
+        #[cfg(all(feature = "enhance", feature = "pictures"))]
         Self::Mcap,
-        #[cfg(feature = "pictures")]
+        #[cfg(all(feature = "enhance", feature = "pictures"))]
         Self::Apng,
     ];
 
@@ -66,8 +67,9 @@ impl Format {
             Self::Npz => "npz",
             Self::Npy => "npy",
             Self::Csv => "csv",
+            #[cfg(all(feature = "enhance", feature = "pictures"))]
             Self::Mcap => "mcap",
-            #[cfg(feature = "pictures")]
+            #[cfg(all(feature = "enhance", feature = "pictures"))]
             Self::Apng => "apng",
         }
     }
@@ -95,8 +97,9 @@ impl Format {
             Self::Npz => "n, h_row, d (mean of all frames), frames (F, M), sequence, times",
             Self::Npy => "the readings of each frame alone, (F, M)",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
+            #[cfg(all(feature = "enhance", feature = "pictures"))]
             Self::Mcap => "the recording with images for Foxglove and Rerun, 30 a second at most",
-            #[cfg(feature = "pictures")]
+            #[cfg(all(feature = "enhance", feature = "pictures"))]
             Self::Apng => "a video of the reconstructed frames",
         }
     }
@@ -124,7 +127,6 @@ pub struct ExportOptions {
     /// two channels of MCAP files.
     pub model: Option<CameraModel>,
     /// Whether MCAP files also get the enhanced images, and how well each of their pixels repeats.
-    #[cfg(feature = "enhance")]
     pub enhance: bool,
     /// Whether a file of the same name is replaced. The recording itself never is.
     pub overwrite: bool,
@@ -192,26 +194,10 @@ pub enum ExportError {
         #[source]
         problem: crate::imaging::EnhanceError,
     },
-    /// The images of a video cannot be made.
-    #[error("{}", .path.display())]
-    Images {
-        /// The recording.
-        path: PathBuf,
-        /// The problem.
-        #[source]
-        problem: ReconstructError,
-    },
-    /// An image cannot be made of a frame.
-    #[error("{}: frame {frame}", .path.display())]
-    Image {
-        /// The recording.
-        path: PathBuf,
-        /// The frame, from 0.
-        frame: usize,
-        /// The problem.
-        #[source]
-        problem: ReconstructError,
-    },
+    /// Images cannot be made.
+    #[cfg(all(feature = "enhance", feature = "pictures"))]
+    #[error(transparent)]
+    Images(#[from] crate::reconstruct::SolverError),
 }
 
 /// Exports a recording to the file `out`, which is whole or not made. The file holds its
@@ -230,21 +216,22 @@ pub fn export(
     let existing = Existing::of(options.overwrite, Some(input));
     existing.check(out)?;
     let source = SourceOptions { keep_leak: options.keep_leak, ..SourceOptions::default() };
-    let whole = Whole::read(input, &source)?;
+    let frames = Frames::open(input, &source)?;
+    let whole = &Whole { source: frames.together()?, frames };
     let provenance = &whole.source.taken.made(made);
-    let mut images = 0;
-    match format {
-        Format::Npz => arrays::npz(&whole, out, existing, provenance)?,
-        Format::Npy => arrays::npy(&whole, out, existing, provenance)?,
-        Format::Csv => arrays::csv(&whole, out, existing, provenance)?,
-        Format::Mcap => images = mcap::write(&whole, out, options, provenance)?,
-        #[cfg(feature = "pictures")]
-        Format::Apng => images = video::apng(&whole, out, existing, provenance)?,
-    }
+    let images = match format {
+        Format::Npz => arrays::npz(whole, out, existing, provenance).map(|()| 0)?,
+        Format::Npy => arrays::npy(whole, out, existing, provenance).map(|()| 0)?,
+        Format::Csv => arrays::csv(whole, out, existing, provenance).map(|()| 0)?,
+        #[cfg(all(feature = "enhance", feature = "pictures"))]
+        Format::Mcap => mcap::write((whole, input), out, options, provenance)?,
+        #[cfg(all(feature = "enhance", feature = "pictures"))]
+        Format::Apng => video::apng((whole, input), out, existing, provenance)?,
+    };
     let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
-    let (frames, patterns) = (whole.sequence.len(), whole.source.measurements.rows().len());
+    let (frames, patterns) = (whole.frames.len(), whole.source.measurements.rows().len());
     let (file, warnings) = (out.to_owned(), whole.source.all_warnings());
-    let mut notes = whole.source.notes;
+    let mut notes = whole.source.notes.clone();
     if whole.source.flat_field.is_some() && format.holds_readings() {
         notes.push(
             "readings are exported without the flat field that is kept for this camera, so their image has the \
@@ -255,92 +242,31 @@ pub fn export(
     Ok(Exported { file, format, bytes, frames, patterns, images, warnings, notes })
 }
 
-/// A recording that was read once: the mean of its frames, and the numbers and times of the frames.
-struct Whole {
-    path: PathBuf,
-    keep_leak: bool,
-    setup: MeasurementSetup,
+/// A recording that was read once.
+struct Whole<'a> {
+    frames: Frames<'a>,
     /// The mean of all frames.
     source: Source,
-    /// What all frames tell of each.
-    known: KnownOfRun,
-    sequence: Vec<i64>,
-    device_time_us: Vec<i64>,
-    time_ns: Vec<i64>,
 }
 
-impl Whole {
-    /// Reads a recording.
-    fn read(path: &Path, options: &SourceOptions) -> Result<Self, ExportError> {
-        let mut recording = Recording::open(path)?;
-        let (mut sequence, mut device_time_us, mut time_ns) = (Vec::new(), Vec::new(), Vec::new());
-        let tally = hear_recording(&mut recording, |heard, tally| {
-            if let Some(frame) = heard.frame() {
-                sequence.push(tally.account().accounted() as i64 - 1);
-                device_time_us.push(frame.device_time_us as i64);
-                time_ns.push(heard.time_ns as i64);
-            }
-            Ok::<(), RecordingError>(())
-        })?;
-        Ok(Self {
-            path: path.to_owned(),
-            keep_leak: options.keep_leak,
-            setup: recording.setup.clone(),
-            source: source::of_sum(path, options, &recording, &tally)?,
-            known: tally.known(),
-            sequence,
-            device_time_us,
-            time_ns,
-        })
-    }
-
-    fn frames(&self) -> usize {
-        self.sequence.len()
-    }
-
+impl Whole<'_> {
     /// Whether no real light was measured.
     fn is_simulated(&self) -> bool {
         self.source.taken.simulated() == Some(true)
     }
 
-    /// Reads the frames one by one: the number of the frame in the recording, and its measurements.
+    /// Reads the frames in their order.
     fn each(
         &self,
-        mut on: impl FnMut(usize, &Measurements) -> Result<(), ExportError>,
+        mut on: impl FnMut(Stamp, &Measurements) -> Result<(), FileError>,
     ) -> Result<(), ExportError> {
-        let mut recording = Recording::open(&self.path)?;
-        let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
-        let mut index = 0;
-        hear_recording(&mut recording, |heard, _| {
-            let Some(frame) = heard.frame() else { return Ok::<(), ExportError>(()) };
-            if index == self.frames() || setup != self.setup {
-                return Err(SourceError::Changed(self.path.clone()).into());
-            }
-            let measurements = Integrated::of_frame(&setup, frame)
-                .of_run(&self.known)
-                .measurements(&setup, settling.as_ref(), self.keep_leak)
-                .map_err(|problem| self.integrate(problem))?;
-            on(index, &measurements)?;
-            index += 1;
-            Ok(())
-        })?;
-        if index == self.frames() {
-            Ok(())
-        } else {
-            Err(SourceError::Changed(self.path.clone()).into())
+        let reading = self.frames.read(AT_A_TIME)?;
+        while let Some(frames) = reading.next() {
+            let frames = frames?;
+            let stamps: Vec<Stamp> = frames.iter().map(|frame| frame.last).collect();
+            let all = self.frames.measurements(frames)?;
+            stamps.iter().zip(&all).try_for_each(|(&stamp, frame)| on(stamp, frame))?;
         }
+        Ok(())
     }
-
-    fn integrate(&self, problem: IntegrateError) -> ExportError {
-        SourceError::Integrate { path: self.path.clone(), problem }.into()
-    }
-}
-
-/// The settings of the default method, with the shipped network where networks are built in, as those
-/// of `nirspi reconstruct`.
-fn settings() -> nirspi_recon::reconstruct::MethodSettings {
-    #[cfg(feature = "enhance")]
-    return nirspi_nets::prior::settings();
-    #[cfg(not(feature = "enhance"))]
-    return nirspi_recon::reconstruct::MethodSettings::default();
 }

@@ -41,6 +41,17 @@ impl Writer {
         writeln!(self.file, "{line}")
     }
 
+    /// Brings what there is to the disk.
+    pub(super) fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+
+    /// The reports that were flushed, without those behind them, which may not fit.
+    pub(super) fn flushed(self, count: usize) -> io::Result<FrameReports> {
+        let (file, _) = self.file.into_parts();
+        FrameReports { file, count }.first(count)
+    }
+
     pub(super) fn finish(self) -> io::Result<FrameReports> {
         let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
         Ok(FrameReports { file, count: self.count })
@@ -58,6 +69,21 @@ impl FrameReports {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
+    }
+
+    /// The first reports alone.
+    pub(super) fn first(self, count: usize) -> io::Result<Self> {
+        let mut bytes = 0;
+        for line in self.lines()?.take(count) {
+            bytes += line?.len() as u64 + 1;
+        }
+        self.file.set_len(bytes)?;
+        Ok(Self { count, ..self })
+    }
+
+    /// Number of bytes of these reports.
+    pub(super) fn bytes(&self) -> io::Result<u64> {
+        Ok(self.file.metadata()?.len())
     }
 
     /// The same reports in another file. The first ones have a field of this name more, with these values.
@@ -123,5 +149,22 @@ mod tests {
         for _ in 0..2 {
             assert_eq!((serde_json::to_string(&all).unwrap(), all.len()), (expected.clone(), 3));
         }
+    }
+
+    #[test]
+    fn of_reports_that_no_longer_fit_those_before_remain() {
+        let mut reports = Writer::new(tempfile::tempfile().unwrap());
+        for used in 0..3 {
+            reports.push(&used).unwrap();
+        }
+        reports.flush().unwrap();
+        reports.push(&"half of a report").unwrap();
+        let reports = reports.flushed(3).unwrap();
+        assert_eq!(
+            (serde_json::to_string(&reports).unwrap().as_str(), reports.bytes().unwrap()),
+            ("[0,1,2]", 6)
+        );
+        let reports = reports.first(1).unwrap();
+        assert_eq!((serde_json::to_string(&reports).unwrap().as_str(), reports.len()), ("[0]", 1));
     }
 }

@@ -170,7 +170,7 @@ pub(super) fn file_images(
 ) -> Result<Vec<FileImage>, SolverError> {
     let made = solver.solve_all(file, sources, is_video, going_on)?;
     let image = |(index, (source, solved)): (usize, (&Source, Solved))| {
-        let Solved { image, with_readings, parts, used, order, report } = solved;
+        let Solved { image, with_readings, parts, used, order, report, .. } = solved;
         // The frames of one recording lack the same, and are judged together.
         let warnings = match index {
             0 => all_warnings(source, &report),

@@ -1,7 +1,9 @@
 //! From measurements as they were read to images, pictures and reports in a folder: [`Pipeline`] for one measurement, all
 //! measurements of a file or recording, or many files; [`own_image`] for patterns of a user's own.
 
+mod for_networks;
 mod frame_reports;
+mod images;
 mod many;
 mod networks;
 mod one;
@@ -12,6 +14,7 @@ mod result_folder;
 mod said;
 mod solver;
 mod stack;
+mod watch;
 
 pub use frame_reports::FrameReports;
 pub use many::Skipped;
@@ -27,7 +30,8 @@ pub use said::{AllSaid, Kind, Said};
 pub use solver::{
     Recipe, Solved, Solver, SolverError, check_finite, not_read_words, own_atoms, read_atoms,
 };
-pub use stack::{StackReport, Step, Watch};
+pub use stack::StackReport;
+pub use watch::{Step, Watch};
 
 use many::FileImage;
 use networks::Networks;

@@ -30,8 +30,7 @@ pub struct DropoutReport {
 /// How steady the light was.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LampReport {
-    /// Number of all-on readings that say so, of readings without complements; else it is the sums of pattern and
-    /// complement.
+    /// Number of all-on readings that say so. Without it, the sums of pattern and complement do.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub all_on_readings: Option<usize>,
     /// Standard deviation of these about their level, as a share of the level.
@@ -94,7 +93,7 @@ pub struct OneReport {
     /// The account of a recording's frames.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frames: Option<LossCounters>,
-    /// How alike the image is to the file's own.
+    /// Correlation of the image with the one that the file holds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation_with_files_recon: Option<f64>,
     /// What the networks report.
@@ -164,7 +163,7 @@ pub(super) fn one_image(
         return Err(PipelineError::Complex);
     }
     let solved = times.time("reconstruct", || solver.solve(folder.input, &source))?;
-    let Solved { image, with_readings, parts, used, order, report: method } = solved;
+    let Solved { image, with_readings, parts, used, order, report: method, .. } = solved;
     let side = image.side().pixels();
     let correlation = source.reference.as_ref().and_then(|reference| {
         metrics::correlation(reference.pixels(), image.pixels(), side, side).ok()

@@ -1,11 +1,12 @@
 //! The image of readings by patterns of a user's own, or the images of all readings of a file, with
 //! pictures and a report, in a folder.
 
+use super::images::Images;
 use super::{SolverError, check_finite, not_read_words, read_atoms, write_image};
+use crate::files::FileError;
 use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain, read_plain_all};
 use crate::files::output::OutputDir;
-use crate::files::{FileError, npy};
-use crate::picture::{FigureStyle, Pictures, Sheet, Unit};
+use crate::picture::{FigureStyle, Pictures, Unit};
 use crate::provenance::{self, Taken};
 use crate::stage_times::StageTimes;
 use nirspi_recon::reconstruct::{
@@ -169,20 +170,18 @@ pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnRepo
         write_image(request.out, &image, None, None, &report.pictures, &report)?;
         return Ok(report);
     }
+    let mut out = OutputDir::create(request.out)?;
+    let wrong = |error| FileError::io(request.out, "write to", error);
+    let mut array = Images::new(&out, "image.npy", (of.height, of.width))?;
+    let mut write = || images.iter().try_for_each(|image| array.push(image.pixels()));
+    times.time("write", &mut write).map_err(wrong)?;
     let header = format!("{}, {} frames", input.display(), images.len());
     let draw = || {
-        let values = images.iter().map(Image::pixels).collect();
-        let sheet = Sheet::new(header, (of.height, of.width), values, Unit::Readings);
-        Pictures::of_stack(&sheet, None, *figure, &provenance)
+        let shown = array.chosen()?;
+        Ok(Pictures::of_stack(&shown.sheet(header, Unit::Readings), None, *figure, &provenance))
     };
-    let pictures = times.time("pictures", draw);
-    let mut out = OutputDir::create(request.out)?;
-    times.time("write", || -> Result<(), FileError> {
-        let pixels: Vec<f32> = images.iter().flat_map(Image::pixels).copied().collect();
-        let shape = [images.len(), of.height, of.width];
-        out.write("image.npy", &npy::encode(&shape, &pixels))?;
-        pictures.write(&mut out)
-    })?;
+    let pictures = times.time("pictures", draw).map_err(wrong)?;
+    times.time("write", || array.finish(&mut out).and_then(|()| pictures.write(&mut out)))?;
     let report = OwnReport { of, made: OwnFrames::All { frames }, pictures, stage_ms: times };
     out.write("report.json", provenance.sign(&report).unwrap_or_default().as_bytes())?;
     out.commit()?;

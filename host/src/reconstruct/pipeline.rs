@@ -21,7 +21,8 @@
 use super::many::{FileImage, Part, file_images, many_images};
 use super::one::{OneReport, one_image};
 use super::pipeline_error::PipelineError;
-use super::stack::{StackReport, Step, Watch, Writing};
+use super::stack::{StackReport, Writing};
+use super::watch::{Step, Watch};
 use super::{Networks, NetworksError, ResultFolder, Solver, SolverError};
 use crate::source::{Source, SourceOptions, Sources};
 use crate::stage_times::StageTimes;
@@ -97,15 +98,13 @@ impl Pipeline {
             let images = batch.map_err(PipelineError::from).and_then(|batch| {
                 times.time("reconstruct", || self.batch(&batch, part, folder, watch))
             });
-            match images {
-                Ok(images) => {
-                    from += images.len();
-                    self.add(&mut writing, &images, folder, &mut times)?;
-                }
-                Err(error) => {
-                    ended = Some(error);
-                    break;
-                }
+            let added = images.and_then(|images| {
+                from += images.len();
+                self.add(&mut writing, &images, folder, &mut times)
+            });
+            if let Err(error) = added {
+                ended = Some(error);
+                break;
             }
         }
         drop(batches);
@@ -128,7 +127,7 @@ impl Pipeline {
         watch: Watch<'_>,
         mut times: StageTimes,
     ) -> Result<StackReport, PipelineError> {
-        let (mut writing, mut skipped, mut side) = (None, Vec::new(), None);
+        let (mut writing, mut skipped, mut side, mut ended) = (None, Vec::new(), None, None);
         let stop = AtomicBool::new(false);
         for some in files.chunks(FILES_AT_A_TIME) {
             let done = || {
@@ -140,12 +139,15 @@ impl Pipeline {
                 times.time("reconstruct", || many_images(some, options, &self.solver, side, &done));
             side = side.or_else(|| made.images.first().map(|image| image.image.side().pixels()));
             skipped.extend(made.skipped);
-            self.add(&mut writing, &made.images, folder, &mut times)?;
-            if stop.load(Ordering::Relaxed) {
+            let added = self.add(&mut writing, &made.images, folder, &mut times);
+            ended = added.err();
+            if ended.is_none() && stop.load(Ordering::Relaxed) {
+                ended = Some(PipelineError::Stopped);
+            }
+            if ended.is_some() {
                 break;
             }
         }
-        let ended = stop.into_inner().then_some(PipelineError::Stopped);
         match (writing, ended) {
             (Some(writing), ended) => writing.finish(skipped, ended, watch, times),
             (None, Some(ended)) => Err(ended),

@@ -4,6 +4,7 @@ use super::SolverError;
 use crate::files::FileError;
 use crate::imaging::FramesError;
 use crate::source::SourceError;
+use std::io::ErrorKind;
 use thiserror::Error;
 
 /// Why there is no image, or no more of a stack.
@@ -39,4 +40,34 @@ pub enum PipelineError {
     /// A result cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
+}
+
+impl PipelineError {
+    /// Whether the images before it can be written.
+    pub(super) fn leaves_images(&self) -> bool {
+        match self {
+            Self::Complex => false,
+            Self::File(_) => self.full().is_some(),
+            _ => true,
+        }
+    }
+
+    /// Whether a disk or a file is full.
+    pub(super) fn full(&self) -> Option<Full> {
+        let Self::File(FileError::Io { system, .. }) = self else { return None };
+        match system.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Some(Full::Disk),
+            ErrorKind::FileTooLarge => Some(Full::File),
+            _ => None,
+        }
+    }
+}
+
+/// What takes no more bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Full {
+    /// The disk.
+    Disk,
+    /// The largest file that a user may have, or the file system.
+    File,
 }

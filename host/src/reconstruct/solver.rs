@@ -1,7 +1,7 @@
 //! A method of reconstruction with its settings, prepared once for each side of images.
 
 use crate::files::{FileError, npy};
-use crate::imaging::MethodReport;
+use crate::imaging::{KnownReadings, MethodReport};
 use crate::source::{FirstPatterns, Source};
 use nirspi_recon::reconstruct::{
     GoingOn, Method, MethodSettings, OwnAtoms, Reconstruct, ReconstructError, Reconstruction,
@@ -63,6 +63,8 @@ pub struct Solved {
     pub used: Measurements,
     /// The name of the order that chose them.
     pub order: String,
+    /// How the readings were taken and the image was made, if their noise is known.
+    pub readings: Option<KnownReadings>,
     /// The method's report.
     pub report: MethodReport,
 }
@@ -186,7 +188,7 @@ impl Solver {
         is_video: bool,
         going_on: GoingOn<'_>,
     ) -> Result<Vec<Solved>, SolverError> {
-        let Recipe { method, first, sampling, .. } = &self.recipe;
+        let Recipe { method, settings, dictionary, first, sampling } = &self.recipe;
         let wrong = |problem| SolverError::Measurements { path: path.to_owned(), problem };
         // Most measurements of a file have the same rows.
         let mut last: Option<(Rows, (ShorterSweep, String))> = None;
@@ -223,7 +225,9 @@ impl Solver {
             check_finite(path, &image)?;
             let image = source.flattened(image);
             let report = MethodReport { method: *method, made };
-            Ok(Solved { image, with_readings, parts, used, order, report })
+            let readings = KnownReadings::new(&report, settings, &used);
+            let readings = readings.filter(|_| dictionary.is_none());
+            Ok(Solved { image, with_readings, parts, used, order, readings, report })
         };
         all.into_par_iter().map(solved).collect()
     }

@@ -3,27 +3,25 @@
 //! Images and their reports go to the disk at once. Networks take the images of a file when all are there, because all
 //! have one white level. Pictures for people show some of the images, which are read again.
 
+use super::for_networks::{Enhanced, ForNetworks};
 use super::frame_reports::{FrameReports, Writer};
-use super::pipeline_error::PipelineError;
-use super::said::{AllSaid, Kind};
+use super::images::Images;
+use super::pipeline_error::{Full, PipelineError};
+use super::said::AllSaid;
+use super::watch::Watch;
 use super::{FileImage, Networks, ResultFolder, Skipped};
-use crate::files::output::{Growing, OutputDir};
-use crate::files::{FileError, npy};
-use crate::imaging::{FrameReport, MethodReport, White};
-use crate::picture::{Pictures, Sheet, Unit, chosen};
+use crate::files::FileError;
+use crate::files::output::OutputDir;
+use crate::imaging::MethodReport;
+use crate::picture::{Pictures, Unit};
 use crate::provenance::Taken;
 use crate::source::OutlierReport;
 use crate::stage_times::StageTimes;
 use nirspi_nets::deblur;
 use nirspi_recon::words::count_of;
-use nirspi_recon::{Image, Rows, Side};
 use serde::Serialize;
-use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
+use std::io;
 use std::path::{Path, PathBuf};
-
-/// Images that networks take at a time: enough for them, few enough for the memory.
-const ENHANCED_AT_A_TIME: usize = 256;
 
 /// The report of a stack.
 #[derive(Debug, Serialize)]
@@ -48,6 +46,9 @@ pub struct StackReport {
     pub pictures: Pictures,
     /// The time of each stage.
     pub stage_ms: StageTimes,
+    /// Whether networks have enlarged and deblurred images.
+    #[serde(skip)]
+    pub enhanced: bool,
     /// Number of images that started from the images before.
     #[serde(skip)]
     pub warm: usize,
@@ -86,26 +87,20 @@ struct ImageReport<'i> {
     /// Number of the measurement in a file of several, if there are several files.
     #[serde(skip_serializing_if = "Option::is_none")]
     index: Option<usize>,
+    /// Number of measurements used.
     used: usize,
+    /// Whether the image started from those before it.
     warm: bool,
+    /// The method.
     #[serde(flatten)]
     method: &'i MethodReport,
+    /// Readings that light cannot have given, whose patterns are left out.
     outliers: &'i [OutlierReport],
+    /// What contradicts the readings.
     warnings: &'i [String],
+    /// Notes for the user.
     notes: &'i [String],
 }
-
-/// What is done to a stack.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
-    /// An image is made of measurements, or all images of one of many files.
-    Reconstruct,
-    /// Networks enlarge and deblur an image.
-    Enhance,
-}
-
-/// Is called before each step of each image, from any thread. `false` ends the work, and the images that are there are written.
-pub type Watch<'w> = &'w (dyn Fn(Step) -> bool + Sync);
 
 /// A stack that is being written.
 pub(super) struct Writing<'r> {
@@ -119,6 +114,8 @@ pub(super) struct Writing<'r> {
     warm: usize,
     last: (usize, String),
     said: AllSaid,
+    /// Number of images of which all is on the disk.
+    whole: usize,
     /// The last to be dropped: a folder that the run has made can go when no file is in it.
     out: OutputDir,
 }
@@ -135,8 +132,9 @@ impl<'r> Writing<'r> {
             Some(networks) => Some(ForNetworks::new(networks, out.scratch()?)),
             None => None,
         };
+        let n = first.image.side().pixels();
         Ok(Self {
-            images: Images::new(&out, "image.npy", first.image.side().pixels())?,
+            images: Images::new(&out, "image.npy", (n, n))?,
             reports: Writer::new(out.scratch()?),
             origin: Origin::of(first),
             order: first.order.clone(),
@@ -144,6 +142,7 @@ impl<'r> Writing<'r> {
             warm: 0,
             last: (0, String::new()),
             said: AllSaid::default(),
+            whole: 0,
             folder,
             out,
             networks,
@@ -155,12 +154,24 @@ impl<'r> Writing<'r> {
         if self.networks.is_some() && images.iter().any(|image| image.complex) {
             return Err(PipelineError::Complex);
         }
-        let many = self.folder.many;
-        for image in images {
-            self.said.of_image(self.images.count, image);
+        self.write(images).map_err(|error| FileError::io(self.folder.out, "write to", error))?;
+        for (number, image) in (self.whole..).zip(images) {
+            self.said.of_image(number, image);
             self.origin.add(image);
             self.warm += usize::from(image.report.made.warm);
-            let report = ImageReport {
+        }
+        self.whole = self.images.count;
+        if let Some(last) = images.last() {
+            self.last = (last.used.len(), last.report.to_string());
+        }
+        Ok(())
+    }
+
+    /// Brings images and their reports to the disk.
+    fn write(&mut self, images: &[FileImage]) -> io::Result<()> {
+        let many = self.folder.many;
+        for image in images {
+            self.reports.push(&ImageReport {
                 file: many.then_some(&image.file),
                 index: image.index.filter(|_| many),
                 used: image.used.len(),
@@ -169,22 +180,18 @@ impl<'r> Writing<'r> {
                 outliers: &image.outliers,
                 warnings: &image.warnings,
                 notes: &image.notes,
-            };
-            let mut kept = || -> io::Result<()> {
-                self.reports.push(&report)?;
-                self.images.push(image.image.pixels())?;
-                self.networks.as_mut().map_or(Ok(()), |networks| networks.push(image))
-            };
-            kept().map_err(|error| FileError::io(self.folder.out, "write to", error))?;
+            })?;
+            self.images.push(image.image.pixels())?;
+            if let Some(networks) = &mut self.networks {
+                networks.push(image)?;
+            }
         }
-        if let Some(last) = images.last() {
-            self.last = (last.used.len(), last.report.to_string());
-        }
-        Ok(())
+        self.reports.flush()?;
+        self.images.flush()
     }
 
     /// Enhances the images if that is asked for, and writes the pictures and the report. `ended` says why there are no
-    /// more images.
+    /// more images; where a disk was full, there may be fewer.
     pub(super) fn finish(
         mut self,
         skipped: Vec<Skipped>,
@@ -192,12 +199,23 @@ impl<'r> Writing<'r> {
         watch: Watch<'_>,
         mut times: StageTimes,
     ) -> Result<StackReport, PipelineError> {
+        if let Some(error) = ended.take_if(|error| self.whole == 0 || !error.leaves_images()) {
+            return Err(error);
+        }
         let wrong = |error| FileError::io(self.folder.out, "write to", error);
         let provenance = self.origin.taken(self.folder.input).made(self.folder.made);
-        let mut frames = self.reports.finish().map_err(wrong)?;
+        let all = match ended.as_ref().and_then(PipelineError::full) {
+            None => self.reports.finish().map(|reports| (self.images, reports)),
+            Some(full) => {
+                // Their images need more space than there is.
+                self.networks = None;
+                those_that_fit(self.images, self.reports, self.whole, full)
+            }
+        };
+        let (mut images, mut frames) = all.map_err(wrong)?;
         let mut enhanced = None;
         if let Some(networks) = self.networks.take() {
-            let pixels = Images::new(&self.out, "enhanced.npy", deblur::SIDE)?;
+            let pixels = Images::new(&self.out, "enhanced.npy", (deblur::SIDE, deblur::SIDE))?;
             let mut made = Enhanced {
                 pixels,
                 reports: Writer::new(self.out.scratch()?),
@@ -205,21 +223,26 @@ impl<'r> Writing<'r> {
                 said: &mut self.said,
             };
             let work = || networks.enhance(&mut made, watch);
-            if let Err(error) = times.time("enhance", work) {
+            let worked = times.time("enhance", work);
+            let Enhanced { pixels, reports, warned, .. } = made;
+            match worked {
+                // What was enhanced gives its space to the rest of the results.
+                Err(error) if error.full().is_some() => ended = ended.or(Some(error)),
                 // Nothing was enhanced: there is no half of a result.
-                if made.pixels.count == 0 || matches!(error, PipelineError::File(_)) {
+                Err(error) if pixels.count == 0 || matches!(error, PipelineError::File(_)) => {
                     return Err(error);
                 }
-                ended = ended.or(Some(error));
+                worked => {
+                    ended = ended.or(worked.err());
+                    let (reports, to) = (reports.finish().map_err(wrong)?, self.out.scratch()?);
+                    frames = frames.with("enhancement", &reports, to).map_err(wrong)?;
+                    enhanced = Some((pixels, warned));
+                }
             }
-            let Enhanced { pixels, reports, warned, .. } = made;
-            let reports = reports.finish().map_err(wrong)?;
-            frames = frames.with("enhancement", &reports, self.out.scratch()?).map_err(wrong)?;
-            enhanced = Some((pixels, warned));
         }
         let pictures = times.time("pictures", || -> io::Result<Pictures> {
-            let header = format!("{}, {} frames", self.folder.named, self.images.count);
-            let shown = self.images.chosen()?;
+            let header = format!("{}, {} frames", self.folder.named, images.count);
+            let shown = images.chosen()?;
             let sheet = shown.sheet(header.clone(), self.unit);
             let sharp = match &mut enhanced {
                 Some((pixels, warned)) => Some((pixels.chosen()?, std::mem::take(warned))),
@@ -233,9 +256,9 @@ impl<'r> Writing<'r> {
             Ok(Pictures::of_stack(&sheet, sharp.as_ref(), self.folder.figure, &provenance))
         });
         let pictures = pictures.map_err(wrong)?;
-        let n = self.images.n;
+        let (n, is_enhanced) = (images.size.0, enhanced.is_some());
         times.time("write", || -> Result<(), FileError> {
-            self.images.finish(&mut self.out)?;
+            images.finish(&mut self.out)?;
             if let Some((pixels, _)) = enhanced {
                 pixels.finish(&mut self.out)?;
             }
@@ -251,6 +274,7 @@ impl<'r> Writing<'r> {
             ended: ended.map(|error| crate::causes::in_one_line(&error)),
             pictures,
             stage_ms: times,
+            enhanced: is_enhanced,
             warm: self.warm,
             last: self.last,
             said: self.said.sorted(),
@@ -261,185 +285,29 @@ impl<'r> Writing<'r> {
     }
 }
 
-/// Images of n x n that become an array in a file.
-struct Images {
-    to: Growing,
-    n: usize,
-    count: usize,
-}
+/// Space for pictures and the beginning of the report.
+const ROOM: u64 = 8 << 20;
 
-impl Images {
-    fn new(out: &OutputDir, name: &str, n: usize) -> Result<Self, FileError> {
-        Ok(Self { to: out.grow(name, Self::header(0, n).len())?, n, count: 0 })
-    }
-
-    /// The bytes before the pixels, whose number is the same for any number of images
-    /// (`tests::a_header_has_one_length`).
-    fn header(count: usize, n: usize) -> Vec<u8> {
-        npy::header::<f32>(&[count, n, n])
-    }
-
-    fn push(&mut self, pixels: &[f32]) -> io::Result<()> {
-        write_pixels(&mut self.to, pixels)?;
-        self.count += 1;
-        Ok(())
-    }
-
-    /// Those that pictures show.
-    fn chosen(&mut self) -> io::Result<Shown> {
-        let numbers = chosen(self.count);
-        let area = self.n * self.n;
-        let mut bytes = vec![0; 4 * area];
-        let mut pixels = Vec::with_capacity(area * numbers.len());
-        for &number in &numbers {
-            self.to.read_at((number * bytes.len()) as u64, &mut bytes)?;
-            pixels.extend(values(&bytes));
-        }
-        Ok(Shown { count: self.count, n: self.n, numbers, pixels })
-    }
-
-    fn finish(self, out: &mut OutputDir) -> Result<(), FileError> {
-        out.take(self.to, &Self::header(self.count, self.n))
-    }
-}
-
-/// Some images of a stack.
-struct Shown {
-    count: usize,
-    n: usize,
-    numbers: Vec<usize>,
-    pixels: Vec<f32>,
-}
-
-impl Shown {
-    fn sheet(&self, header: String, unit: Unit) -> Sheet<'_> {
-        let n = self.n;
-        let images = self.pixels.chunks_exact(n * n).collect();
-        Sheet::of_chosen(header, (n, n), self.count, (self.numbers.clone(), images), unit)
-    }
-}
-
-fn write_pixels(to: &mut impl Write, pixels: &[f32]) -> io::Result<()> {
-    let bytes: Vec<u8> = pixels.iter().flat_map(|pixel| pixel.to_le_bytes()).collect();
-    to.write_all(&bytes)
-}
-
-fn values(bytes: &[u8]) -> impl Iterator<Item = f32> {
-    bytes.as_chunks::<4>().0.iter().map(|&pixel| f32::from_le_bytes(pixel))
-}
-
-/// Images as networks take them, until all of a file are there.
-struct ForNetworks<'r> {
-    networks: &'r Networks,
-    pixels: BufWriter<File>,
-    /// Images one after another that are alike, of which `levels` has the white level of each.
-    alike: Vec<Alike>,
-}
-
-struct Alike {
-    file: PathBuf,
-    rows: Rows,
-    side: Side,
-    levels: Vec<f32>,
-    first: usize,
-}
-
-/// What networks have made.
-struct Enhanced<'s> {
-    pixels: Images,
+/// The first `whole` images and their reports; of a disk that is full, only as many as leave room for the rest of the results.
+fn those_that_fit(
+    images: Images,
     reports: Writer,
-    warned: Vec<usize>,
-    said: &'s mut AllSaid,
-}
-
-impl<'r> ForNetworks<'r> {
-    fn new(networks: &'r Networks, file: File) -> Self {
-        Self { networks, pixels: BufWriter::with_capacity(1 << 16, file), alike: Vec::new() }
-    }
-
-    fn push(&mut self, image: &FileImage) -> io::Result<()> {
-        let given = &image.with_readings;
-        write_pixels(&mut self.pixels, given.pixels())?;
-        let level = White::Brightest.level(given);
-        match self.alike.last_mut() {
-            Some(alike) if alike.rows == image.used && alike.file == image.file => {
-                alike.levels.push(level);
-            }
-            before => {
-                let first = before.map_or(0, |alike| alike.first + alike.levels.len());
-                let (file, rows) = (image.file.clone(), image.used.clone());
-                let alike = Alike { file, rows, side: given.side(), levels: vec![level], first };
-                self.alike.push(alike);
-            }
+    whole: usize,
+    full: Full,
+) -> io::Result<(Images, FrameReports)> {
+    let reports = reports.flushed(whole)?;
+    let given_up = match full {
+        Full::File => 0,
+        // The report repeats the reports of all images that are left.
+        Full::Disk => {
+            let reports = reports.bytes()?;
+            let each = images.bytes_of(1) + 2 * (reports / (whole as u64).max(1));
+            (reports + ROOM).div_ceil(each) as usize
         }
-        Ok(())
-    }
-
-    /// Enhances all images. Those of a file have one white level.
-    fn enhance(self, made: &mut Enhanced<'_>, watch: Watch<'_>) -> Result<(), PipelineError> {
-        let Self { networks, pixels, alike } = self;
-        let wrong = |error| FileError::io(Path::new("images for networks"), "read", error);
-        let rewound = || -> io::Result<File> {
-            let mut file = pixels.into_inner().map_err(io::IntoInnerError::into_error)?;
-            file.rewind()?;
-            Ok(file)
-        };
-        let mut pixels = BufReader::with_capacity(1 << 16, rewound().map_err(wrong)?);
-        let mut turns = networks.turns();
-        for of_file in alike.chunk_by(|a, b| a.file == b.file) {
-            let levels = of_file.iter().flat_map(|alike| alike.levels.iter().copied());
-            let white = White::median(levels);
-            let in_file: usize = of_file.iter().map(|alike| alike.levels.len()).sum();
-            let start = of_file[0].first;
-            for alike in of_file {
-                let mut bytes = vec![0; 4 * alike.side.area()];
-                let mut number = alike.first;
-                let end = alike.first + alike.levels.len();
-                while number < end {
-                    let some = ENHANCED_AT_A_TIME.min(end - number);
-                    if !(0..some).all(|_| watch(Step::Enhance)) {
-                        return Err(PipelineError::Stopped);
-                    }
-                    let read = (0..some).map(|_| {
-                        pixels.read_exact(&mut bytes)?;
-                        Ok(Image::new(alike.side, values(&bytes).collect()))
-                    });
-                    let images: Vec<Image> = read.collect::<io::Result<_>>().map_err(wrong)?;
-                    let images: Vec<&Image> = images.iter().collect();
-                    let results = networks.enhance(&mut turns, &images, &alike.rows, white)?;
-                    for (number, (sharp, report)) in (number..).zip(results) {
-                        let index = (in_file > 1).then_some(number - start);
-                        let of = || (alike.file.clone(), index);
-                        made.push(number, of, &sharp, &report).map_err(wrong)?;
-                    }
-                    number += some;
-                }
-            }
-        }
-        if let (Some(said), Some(first)) = (turns.said(), alike.first()) {
-            let said = format!("networks: {said}");
-            made.said.add(Kind::Note, &said, 0, || (first.file.clone(), None));
-        }
-        Ok(())
-    }
-}
-
-impl Enhanced<'_> {
-    fn push(
-        &mut self,
-        number: usize,
-        of: impl Fn() -> (PathBuf, Option<usize>),
-        sharp: &[f32],
-        report: &FrameReport,
-    ) -> io::Result<()> {
-        if report.warns() {
-            self.warned.push(number);
-        }
-        for warning in &report.warnings {
-            self.said.add(Kind::Warning, warning, number, &of);
-        }
-        self.reports.push(report)?;
-        self.pixels.push(sharp)
+    };
+    match whole.checked_sub(given_up).filter(|&count| count > 0) {
+        Some(count) => Ok((images.cut(count)?, reports.first(count)?)),
+        None => Err(io::ErrorKind::StorageFull.into()),
     }
 }
 
@@ -468,20 +336,6 @@ impl Origin {
         match self.is_one_file {
             true => self.taken.clone(),
             false => Taken::of_file(named, self.taken.simulated().filter(|_| self.is_alike)),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_header_has_one_length() {
-        for n in [1, 32, 64, 4096] {
-            for count in [1, 9, 1_000_000, usize::MAX] {
-                assert_eq!(Images::header(count, n).len(), Images::header(0, n).len());
-            }
         }
     }
 }

@@ -97,7 +97,6 @@ impl Iterator for Batches<'_, '_> {
         }
         let read = match &mut self.from {
             From::Frames { frames, reading } => match reading.next()? {
-                Ok(batch) if batch.is_empty() => return None,
                 Ok(batch) => frames.sources(batch),
                 Err(error) => vec![Err(error)],
             },

@@ -5,13 +5,19 @@ use super::{NOT_CALIBRATED, Source, SourceError, SourceOptions, not_whole};
 use crate::calibration::KeptFlatField;
 use crate::causes;
 use crate::files::FileError;
-use crate::integrate::Integrated;
+use crate::integrate::{Integrated, KnownOfRun};
 use crate::moving::followed;
 use crate::provenance::Taken;
 use crate::recording::{End, Recording, RecordingError, hear_recording, tally_recording};
+use crate::setup::MeasurementSetup;
 use crate::tally::Tally;
+use nirspi_camera::integrate::NEWEST;
+use nirspi_recon::Measurements;
+use nirspi_wire::Frame;
 use rayon::prelude::*;
+use std::collections::VecDeque;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread;
 
@@ -23,7 +29,7 @@ pub(super) fn from_recording(path: &Path, options: &SourceOptions) -> Result<Sou
 }
 
 /// The measurements of the sum of all frames.
-pub(crate) fn of_sum(
+fn of_sum(
     path: &Path,
     options: &SourceOptions,
     recording: &Recording,
@@ -59,9 +65,32 @@ pub struct Frames<'a> {
     flat_field: FlatFieldRead,
 }
 
+/// Neighbouring frames that were added, or one of them alone.
+pub(crate) struct Added {
+    sum: Integrated,
+    /// The newest of several frames of a scene that changes, each alone, with their numbers.
+    newest: VecDeque<(u64, Arc<Integrated>)>,
+    /// The last frame.
+    pub last: Stamp,
+}
+
+/// The number of a frame in a recording and its times.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stamp {
+    /// Among those that the camera has made.
+    pub sequence: i64,
+    /// Of the camera's clock.
+    pub device_time_us: u64,
+    /// Of the computer's clock, when it arrived.
+    pub time_ns: u64,
+}
+
+/// Whether a frame begins a new sum, instead of being added to those before.
+type Begins = Box<dyn FnMut(Stamp) -> bool + Send>;
+
 impl<'a> Frames<'a> {
     /// Reads the recording once: what its frames tell of each other, and how many there are.
-    pub(super) fn open(path: &'a Path, options: &'a SourceOptions) -> Result<Self, SourceError> {
+    pub(crate) fn open(path: &'a Path, options: &'a SourceOptions) -> Result<Self, SourceError> {
         let mut recording = Recording::open(path)?;
         let mut count = 0;
         let tally = hear_recording(&mut recording, |heard, _| {
@@ -76,7 +105,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Number of frames.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.count
     }
 
@@ -86,25 +115,52 @@ impl<'a> Frames<'a> {
         fits_together(self.path, self.count, rows.len(), rows.side())
     }
 
-    /// Begins to read the frames, `most` at a time, in a thread of its own.
-    pub(super) fn read(&self, most: usize) -> Result<Reading, SourceError> {
+    /// The measurements of the sum of all frames.
+    pub(crate) fn together(&self) -> Result<Source, SourceError> {
+        of_sum(self.path, self.options, &self.recording, &self.tally)
+    }
+
+    /// Begins to read the frames one by one, `most` at a time, in a thread of its own.
+    pub(crate) fn read(&self, most: usize) -> Result<Reading, SourceError> {
+        self.read_added(most, Box::new(|_| true))
+    }
+
+    /// Begins to read sums of neighbouring frames, `most` of them at a time, in a thread of its own.
+    pub(crate) fn read_added(
+        &self,
+        most: usize,
+        mut begins: Begins,
+    ) -> Result<Reading, SourceError> {
         let mut recording = Recording::open(self.path)?;
         let (path, setup, count) = (self.path.to_owned(), self.recording.setup.clone(), self.count);
         if recording.setup != setup {
             return Err(SourceError::Changed(path));
         }
+        let changes = self.tally.known().changed.is_some();
         // One batch is on its way while the one before is worked on.
         let (to, from) = sync_channel(0);
         let read = move || {
             let (mut batch, mut seen) = (Vec::new(), 0);
-            let heard = hear_recording(&mut recording, |heard, _| {
+            let heard = hear_recording(&mut recording, |heard, tally| {
                 let Some(frame) = heard.frame() else { return Ok(()) };
-                batch.push(Integrated::of_frame(&setup, frame));
+                let stamp = Stamp {
+                    sequence: tally.account().accounted() as i64 - 1,
+                    device_time_us: frame.device_time_us,
+                    time_ns: heard.time_ns,
+                };
                 seen += 1;
-                match batch.len() == most {
-                    true => to.send(Ok(std::mem::take(&mut batch))).map_err(|_| Ended::NotWanted),
-                    false => Ok(()),
+                let is_new = begins(stamp);
+                match batch.last_mut() {
+                    Some(added) if !is_new => Added::add(added, &setup, frame, stamp, changes),
+                    _ => {
+                        if batch.len() == most {
+                            to.send(Ok(std::mem::take(&mut batch)))
+                                .map_err(|_| Ended::NotWanted)?;
+                        }
+                        batch.push(Added::of(&setup, frame, stamp));
+                    }
                 }
+                Ok(())
             });
             let last = match heard {
                 Ok(_) if seen == count => Ok(batch),
@@ -122,27 +178,70 @@ impl<'a> Frames<'a> {
         Ok(Reading { from })
     }
 
-    /// The measurements of frames that were read.
-    pub(super) fn sources(&self, frames: Vec<Integrated>) -> Vec<Result<Source, SourceError>> {
+    /// The measurements of frames that were read, and what is known of them.
+    pub(crate) fn sources(&self, frames: Vec<Added>) -> Vec<Result<Source, SourceError>> {
         let (known, Self { path, options, recording, tally, flat_field, .. }) =
             (self.tally.known(), self);
-        let source = |frame: Integrated| {
+        let source = |frame: Added| {
             let frame = frame.of_run(&known);
             of_frames(path, options, recording, &frame, tally, flat_field)
         };
         frames.into_par_iter().map(source).collect()
     }
+
+    /// The readings of frames that were read: all, as they are.
+    pub(crate) fn measurements(
+        &self,
+        frames: Vec<Added>,
+    ) -> Result<Vec<Measurements>, SourceError> {
+        let (known, Recording { setup, settling, .. }) = (self.tally.known(), &self.recording);
+        let measured = |frame: Added| {
+            let frame = frame.of_run(&known);
+            frame.measurements(setup, settling.as_ref(), self.options.keep_leak)
+        };
+        let all: Result<_, _> = frames.into_par_iter().map(measured).collect();
+        all.map_err(|problem| SourceError::Integrate { path: self.path.to_owned(), problem })
+    }
+}
+
+impl Added {
+    fn of(setup: &MeasurementSetup, frame: &Frame<'_>, last: Stamp) -> Self {
+        Self { sum: Integrated::of_frame(setup, frame), newest: VecDeque::new(), last }
+    }
+
+    /// Adds a frame; where the scene `changes`, also keeps it alone for a while.
+    fn add(&mut self, setup: &MeasurementSetup, frame: &Frame<'_>, at: Stamp, changes: bool) {
+        let Self { sum, newest, last } = self;
+        if changes {
+            if newest.is_empty() {
+                newest.push_back((last.sequence as u64, Arc::new(sum.clone())));
+            }
+            if newest.len() == NEWEST {
+                newest.pop_front();
+            }
+            newest.push_back((at.sequence as u64, Arc::new(Integrated::of_frame(setup, frame))));
+        }
+        sum.add(frame);
+        *last = at;
+    }
+
+    /// The sum, with what all frames tell of it.
+    fn of_run(self, known: &KnownOfRun) -> Integrated {
+        let mut known = known.clone();
+        known.newest = self.newest.into();
+        self.sum.of_run(&known)
+    }
 }
 
 /// Frames that another thread reads.
-pub(super) struct Reading {
-    from: Receiver<Result<Vec<Integrated>, SourceError>>,
+pub(crate) struct Reading {
+    from: Receiver<Result<Vec<Added>, SourceError>>,
 }
 
 impl Reading {
-    /// The next frames; `None` at the end.
-    pub(super) fn next(&self) -> Option<Result<Vec<Integrated>, SourceError>> {
-        self.from.recv().ok()
+    /// The next frames, at least one; `None` at the end.
+    pub(crate) fn next(&self) -> Option<Result<Vec<Added>, SourceError>> {
+        self.from.recv().ok().filter(|batch| !matches!(batch, Ok(batch) if batch.is_empty()))
     }
 }
 

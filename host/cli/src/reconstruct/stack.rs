@@ -120,7 +120,7 @@ fn finish(
         if let more @ 1.. = report.said.left_out() {
             print::note(format_args!("{more} more such lines are in report.json"))?;
         }
-        let enhanced = if args.enhance { ", enhanced.npy" } else { "" };
+        let enhanced = if report.enhanced { ", enhanced.npy" } else { "" };
         let (pictures, out) = (&report.pictures, args.out.display());
         print::line(format_args!("wrote image.npy{enhanced}, {pictures} and report.json to {out}"))
     })?;

@@ -115,3 +115,35 @@ fn a_file_name_that_is_no_utf_8_costs_its_own_image_alone() {
     let skipped = &bench.json("out/report.json")["skipped"];
     assert_eq!(skipped[0]["file"], "in/0000\u{fffd}.npz", "{skipped}");
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_leaves_the_images_before_it_and_says_how_many() {
+    use nirspi::files::{archive, npy};
+    // More than are worked on together.
+    let (bench, count, before) = (Bench::new(), 5000, 4096);
+    let values: Vec<f64> =
+        (0..count * 256).map(|k| if k % 16 == 0 { 900.0 } else { (k * 7 % 31) as f64 }).collect();
+    let rows: Vec<i64> = (0..256).collect();
+    let members = [
+        ("n", npy::encode(&[], &[16_i64])),
+        ("h_row", npy::encode(&[256], &rows)),
+        ("d", npy::encode(&[count, 256], &values)),
+    ];
+    bench.write("many.npz", &archive::encode(&bench.path("many.npz"), &members).unwrap());
+    let command = ["reconstruct", "many.npz", "--index", "all", "--method", "hadamard", "--out"];
+    bench.run(&[&command[..], &["whole"]].concat()).succeeded();
+    // All images, of 1 kB, do not fit into a file, the first 4096 do. The shell counts blocks of 512 bytes.
+    let limit = format!("ulimit -f {}", 2 * 4500);
+    let said = bench.run_limited(&limit, &[&command[..], &["out"]].concat());
+    said.failed(1, &["out: 4096 images, then: out: cannot write to it: File too large"]);
+    assert_eq!(bench.pixels("out/image.npy"), bench.pixels("whole/image.npy")[..before * 256]);
+    let report = bench.json("out/report.json");
+    assert_eq!(report["frames"].as_array().unwrap().len(), before);
+    assert!(report["ended"].as_str().unwrap().contains("File too large"), "{report}");
+    // Where not even the first ones fit, nothing is left.
+    bench
+        .run_limited("ulimit -f 100", &[&command[..], &["none"]].concat())
+        .failed(1, &["File too large"]);
+    assert_eq!(bench.names(), ["many.npz", "out", "whole"]);
+}

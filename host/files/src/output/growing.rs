@@ -44,6 +44,30 @@ impl Growing {
         read
     }
 
+    /// Keeps this number of bytes after the beginning, and drops those behind them. Bytes that the disk has not taken are
+    /// among these.
+    ///
+    /// # Errors
+    /// The system's, and that of a file that is not as long.
+    pub fn cut(self, bytes: u64) -> io::Result<Self> {
+        // What waits in the memory is not written: it may not fit.
+        let (mut file, _) = self.file.into_parts();
+        let end = self.beginning as u64 + bytes;
+        file.set_len(file.metadata()?.len().min(end))?;
+        file.seek(SeekFrom::Start(self.beginning as u64))?;
+        let mut hasher = crc32fast::Hasher::new();
+        let mut some = vec![0; 1 << 16];
+        let mut left = bytes;
+        while left > 0 {
+            let part = &mut some[..left.min(1 << 16) as usize];
+            file.read_exact(part)?;
+            hasher.update(part);
+            left -= part.len() as u64;
+        }
+        let file = BufWriter::with_capacity(1 << 16, file);
+        Ok(Self { file, hasher, bytes, ..self })
+    }
+
     pub(super) fn finish(
         self,
         folder: &Path,

@@ -8,14 +8,17 @@ use std::path::Path;
 
 /// A hidden file beside a result, with numbers that become part of the result later. It is removed when it is dropped.
 #[derive(Debug)]
-pub(crate) struct Spool {
+pub struct Spool {
     file: fs::File,
     _staged: Staged,
 }
 
 impl Spool {
-    /// A new, empty one.
-    pub(crate) fn beside(target: &Path) -> Result<Self, FileError> {
+    /// A new, empty one, beside this result.
+    ///
+    /// # Errors
+    /// [`FileError`] if the folder is missing, or the system refuses.
+    pub fn beside(target: &Path) -> Result<Self, FileError> {
         hidden(target).map(|(file, _staged)| Self { file, _staged })
     }
 }
