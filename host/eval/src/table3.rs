@@ -26,6 +26,7 @@ use nirspi_nets::{Weights, upscale_2x};
 use nirspi_optics::rain::Air;
 use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::Image;
+use nirspi_recon::metrics::correlation;
 use rayon::prelude::*;
 use rows::{Measured, Statistics};
 use serde::Serialize;
@@ -251,18 +252,24 @@ fn white_at(whites: &[f32; 3], distance_m: f64) -> f32 {
     whites[at.unwrap_or(0)]
 }
 
-/// PSNR in dB and SSIM.
+/// PSNR in dB, SSIM and correlation.
 #[derive(Debug, Clone, Copy)]
 struct Scores {
     psnr_db: f64,
     ssim: f64,
+    /// 0 for a blank image.
+    correlation: f64,
 }
 
 /// The scores of an image after the gain and offset of least squares.
 fn scores(image: &Image, truth: &[f32]) -> Result<Scores> {
     let quality = score(image, truth)?;
     match (quality.psnr_db, quality.ssim) {
-        (Some(psnr_db), Some(ssim)) => Ok(Scores { psnr_db, ssim }),
+        (Some(psnr_db), Some(ssim)) => {
+            let side = image.side().pixels();
+            let correlation = correlation(truth, image.pixels(), side, side).unwrap_or_default();
+            Ok(Scores { psnr_db, ssim, correlation })
+        }
         _ => Err(EvalError::Content(quality.no_psnr.unwrap_or_default().to_owned())),
     }
 }
@@ -455,9 +462,10 @@ mod tests {
                 psnr["value"].as_f64().unwrap() - row["blank_psnr_db"]["value"].as_f64().unwrap();
             assert!(over > -0.1, "{row}");
             let shows_nothing = row["no_measurable_image"].as_bool().unwrap();
+            let correlation = row["correlation"]["value"].as_f64().unwrap();
             match (row["image"].as_str().unwrap(), row["distance_m"].as_f64()) {
-                ("VIS", _) => assert!(!shows_nothing, "{row}"),
-                ("NIR-SPI", Some(1.0)) => assert!(shows_nothing, "{row}"),
+                ("VIS", _) => assert!(!shows_nothing && correlation > 0.99, "{row}"),
+                ("NIR-SPI", Some(1.0)) => assert!(shows_nothing && correlation < 0.4, "{row}"),
                 _ => assert_eq!(shows_nothing, over < 0.5, "{row}"),
             }
         }

@@ -147,14 +147,19 @@ fn undo(taps: &[f64], y: &mut [f64], sweep: Sweep) {
     // shrinks the error at least by the leaked share.
     let share = taps[1..].iter().map(|tap| tap.abs()).sum::<f64>() / taps[0];
     let passes = (f64::EPSILON.ln() / share.ln()).ceil().max(1.0) as usize + 1;
-    for _ in 0..passes {
-        let mut settled = true;
+    for pass in 0..passes {
+        // Slots one after another that are as the pass before has left them.
+        let mut settled = 0;
         for i in 0..count {
             let x = (leaked[i] - from_earlier(y, i)) / taps[0];
-            settled &= x == y[i];
+            settled = if x == y[i] { settled + 1 } else { 0 };
             y[i] = x;
+            // What follows depends on these alone, so it is as the pass before has left it.
+            if pass > 0 && settled > earlier.len() && i >= earlier.len() {
+                return;
+            }
         }
-        if settled {
+        if settled == count {
             return;
         }
     }

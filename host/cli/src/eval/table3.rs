@@ -52,15 +52,16 @@ fn say(report: &Report) -> Result<()> {
     ))?;
     print::line(format_args!("typefaces: {}", report.typefaces.join(", ")))?;
     print::line(
-        "image                distance  PSNR dB                   SSIM                      without rain     blank     Fréchet                 paper",
+        "image                distance  PSNR dB                   SSIM                      correlation               without rain     blank     Fréchet                 paper",
     )?;
     for row in &report.rows {
         print::line(format_args!(
-            "{:<20} {:<8}  {:<24}  {:<24}  {:5.2} dB, {:.3}  {:5.2} dB  {:<22}  {} dB, {}{}{}",
+            "{:<20} {:<8}  {:<24}  {:<24}  {:<24}  {:5.2} dB, {:.3}  {:5.2} dB  {:<22}  {} dB, {}{}{}",
             row.image.name(),
             at(row.distance_m),
             row.psnr_db.text(2),
             row.ssim.text(3),
+            row.correlation.text(2),
             row.dry_psnr_db.value,
             row.dry_ssim.value,
             row.blank_psnr_db.value,

@@ -30,6 +30,8 @@ pub struct Row {
     pub psnr_db: Interval,
     /// SSIM after the same fit.
     pub ssim: Interval,
+    /// Correlation with the scene: 0 for a blank picture.
+    pub correlation: Interval,
     /// PSNR of the same scenes and noise without rain.
     pub dry_psnr_db: Interval,
     /// SSIM of the same scenes and noise without rain.
@@ -162,6 +164,7 @@ impl Statistics<'_> {
             no_measurable_image: psnr_db.value < blank_psnr_db.value + LEAST_OVER_BLANK_DB,
             psnr_db,
             ssim: self.mean(distance, |k| wet[k].quality.ssim),
+            correlation: self.mean(distance, |k| wet[k].quality.correlation),
             dry_psnr_db: self.mean(distance, |k| dry[k].quality.psnr_db),
             dry_ssim: self.mean(distance, |k| dry[k].quality.ssim),
             blank_psnr_db,
