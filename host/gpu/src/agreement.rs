@@ -48,6 +48,10 @@ pub struct Law {
     pub binding: bool,
     /// Factor on the expected radius of the ball.
     pub tau: f32,
+    /// An image stays as it was if the moved one is farther from its readings than this inconsistency,
+    pub reached: f32,
+    /// and than this share of the distance before.
+    pub stuck: f32,
     /// Smallest standard deviation assumed for a reading.
     pub noise_floor: f32,
     /// The interval of lambda, as decimal logarithms.
@@ -173,13 +177,15 @@ impl<R: Runtime> Agree for ComputeClient<R> {
                 .map(|row| f32::from(u8::from(measured.is_none_or(|measured| measured[row])))),
         );
         let degrees = tables[layout::MASK..].iter().sum::<f32>();
-        let mut settings = [0.0; 12];
+        let mut settings = [0.0; 14];
         settings[SETTINGS.sigma_scale] = told.sigma_scale;
         [settings[SETTINGS.sigma_least], settings[SETTINGS.sigma_most]] = told.sigma;
         settings[SETTINGS.noise_scale] = told.noise_scale;
         [settings[SETTINGS.noise_least], settings[SETTINGS.noise_most]] = told.noise;
         settings[SETTINGS.noise_floor] = law.noise_floor;
         settings[SETTINGS.tau] = law.tau;
+        settings[SETTINGS.reached] = law.reached;
+        settings[SETTINGS.stuck] = law.stuck;
         [settings[SETTINGS.least_log], settings[SETTINGS.most_log]] = law.logs;
         settings[SETTINGS.degrees] = degrees;
         settings[SETTINGS.tolerance] = law.tolerance;

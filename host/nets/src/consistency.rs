@@ -8,8 +8,14 @@
 //! Of all changes with the same norm this one fits best (Tikhonov; Morozov's discrepancy
 //! principle).
 //!
+//! The blur may be no Gaussian at all: that of a target that moved, of a lens out of focus, or what the estimator took for
+//! one. Then no image agrees with the readings, and the change only spoils what the network has made. The readings tell:
+//! where the new image, in [0, 1], is still farther from them than `REACHED`, and the change has taken less than 0.6 of the
+//! distance (`STUCK`), the old one stays. An image that is far off for another reason comes much nearer.
+//!
 //! # Invariant
-//! An image inside the ball is not changed (`tests::inside_the_ball_nothing_changes`).
+//! An image inside the ball is not changed (`tests::inside_the_ball_nothing_changes`), nor one whose readings no image of
+//! this model gives (`tests::an_image_stays_where_no_image_gives_its_readings`).
 //!
 //! # How the equation is solved
 //! With reflecting edges B is diagonal in the cosine transform (DCT-II), and pair means fold cosine
@@ -48,6 +54,15 @@ pub const CONTRADICTED: f32 = 1.2;
 pub fn is_contradicted(inconsistency: f32) -> bool {
     inconsistency > CONTRADICTED || inconsistency.is_nan()
 }
+
+/// Inconsistency up to which an image that was moved counts as one that agrees: more than the radius, because pixels below 0
+/// and above 1 are cut off after the move. Of 34 images under eleven blurs and two noises, 1.12 to 1.2 gave the same to 0.2 dB.
+const REACHED: f32 = 1.15;
+
+/// Share of the distance from the readings that a move leaves where no image has these readings. With 0.4, letters smeared by
+/// 2 to 8 pixels of motion gained 4.3 dB, those out of focus 1.5 dB, letters and photographs under a Gaussian lost nothing
+/// (0.01 dB); with 0.5 and 0.6 letters gained less.
+const STUCK: f32 = 0.4;
 
 /// Smallest standard deviation assumed for the readings, because the estimated blur is not exact
 /// and no true blur is exactly Gaussian.
@@ -138,12 +153,25 @@ impl Consistency {
         norm(&residual) / (self.noise * (self.degrees() as f32).sqrt())
     }
 
-    /// Moves `image` onto the ball, if the image is outside.
-    pub fn project(&self, readings: &[f32], image: &mut [f32]) {
+    /// Clamps `image` to [0, 1] and moves it into agreement with its readings, where an image of this model can agree.
+    pub fn agree(&self, readings: &[f32], image: &mut [f32]) {
+        clamp(image);
+        let before = image.to_vec();
+        if self.project(readings, image) {
+            clamp(image);
+            let left = self.residual_ratio(readings, image);
+            if left > REACHED && left > STUCK * self.residual_ratio(readings, &before) {
+                image.copy_from_slice(&before);
+            }
+        }
+    }
+
+    /// Moves `image` onto the ball. `false` if the image is inside already.
+    fn project(&self, readings: &[f32], image: &mut [f32]) -> bool {
         let radius = TAU * self.noise * (self.degrees() as f32).sqrt();
         let residual = self.residual(readings, image);
         if norm(&residual) <= radius {
-            return;
+            return false;
         }
         let dual = match &self.measured {
             MeasuredRows::All => self.solve(&residual, radius),
@@ -151,6 +179,7 @@ impl Consistency {
         };
         let change = self.camera.adjoint(&dual);
         image.iter_mut().zip(change).for_each(|(pixel, change)| *pixel += change);
+        true
     }
 
     /// Number of readings that count.
@@ -212,6 +241,11 @@ impl Consistency {
             }
         }
     }
+}
+
+/// Cuts pixels off at 0 and 1.
+pub fn clamp(image: &mut [f32]) {
+    image.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
 }
 
 /// The largest lambda, from [`LEAST_LAMBDA`] up on a logarithmic scale, whose result is not

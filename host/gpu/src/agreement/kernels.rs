@@ -544,7 +544,19 @@ pub(super) fn agree(
     if comptime!(shape.sampled) {
         measured_part(&mut seen, &mut small, &mut half, tables);
     }
-    let left = f32::sqrt(dot(&seen, &seen, &mut sums));
+    let mut left = f32::sqrt(dot(&seen, &seen, &mut sums));
+    if comptime!(shape.binding) {
+        // No image of the camera's model gives these readings: the guess stays.
+        let reached = law[comptime!(SETTINGS.reached)] * expected;
+        if length > radius && left > max(reached, law[comptime!(SETTINGS.stuck)] * length) {
+            left = length;
+            #[unroll]
+            for i in 0..16usize {
+                let at = frame * comptime!(FINE * FINE) + (top + 4 * i) * FINE + x;
+                out[at] = min(max(guesses[at], 0.0f32), 1.0f32);
+            }
+        }
+    }
     let broken = total(broken, &mut sums);
     if unit == 0 {
         let mut ratio = left / expected;

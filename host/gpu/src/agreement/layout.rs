@@ -35,6 +35,8 @@ pub(super) struct Places {
     pub most_log: usize,
     pub degrees: usize,
     pub tolerance: usize,
+    pub reached: usize,
+    pub stuck: usize,
 }
 
 pub(super) const SETTINGS: Places = Places {
@@ -50,4 +52,6 @@ pub(super) const SETTINGS: Places = Places {
     most_log: 9,
     degrees: 10,
     tolerance: 11,
+    reached: 12,
+    stuck: 13,
 };

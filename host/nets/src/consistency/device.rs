@@ -1,14 +1,17 @@
 //! The same agreement on a GPU, where one kernel makes it for many images.
 //!
 //! # Invariant
-//! The images are those of [`Consistency::project`](super::Consistency::project), to 2e-4
+//! The images are those of [`Consistency::agree`](super::Consistency::agree), to 2e-4
 //! (`gpu::tests::agreement::images_agree_as_on_the_processor`).
 
 use nirspi_gpu::agreement::{Agreement, Law, Matrices, Told};
 use nirspi_gpu::limits::DeviceLimits;
 use nirspi_gpu::{GpuError, Kernels};
 
-use super::{BISECTIONS, LEAST_LAMBDA, MOST_LOG_LAMBDA, NOISE_FLOOR, OF_IMAGE, OF_READINGS, TAU};
+use super::{
+    BISECTIONS, LEAST_LAMBDA, MOST_LOG_LAMBDA, NOISE_FLOOR, OF_IMAGE, OF_READINGS, REACHED, STUCK,
+    TAU,
+};
 use super::{MeasuredRows, krylov, measured};
 use crate::estimate::{KnownEstimate, NOISE_SCALE, SIGMA_SCALE_PX};
 use crate::grid::COARSE;
@@ -38,6 +41,8 @@ pub(crate) fn agreement(
     let law = Law {
         binding,
         tau: TAU,
+        reached: REACHED,
+        stuck: STUCK,
         noise_floor: NOISE_FLOOR,
         logs: [LEAST_LAMBDA.log10(), MOST_LOG_LAMBDA],
         halvings: BISECTIONS,

@@ -143,3 +143,33 @@ fn what_no_image_explains_is_not_amplified() {
         assert!(model.residual_ratio(&readings, &image) > 2.0 * TAU, "nothing is hidden");
     }
 }
+
+#[test]
+fn an_image_stays_where_no_image_gives_its_readings() {
+    let mut bars = vec![0.1; SIDE * SIDE];
+    (8..56).for_each(|y| [12, 28, 44].iter().for_each(|x| bars[y * SIDE + x..][..5].fill(0.9)));
+    // A target that moved by 8 pixels to the right.
+    let moved: Vec<f32> = (0..SIDE * SIDE)
+        .map(|i| {
+            (0..8).map(|by| bars[i / SIDE * SIDE + (i % SIDE + SIDE - by) % SIDE]).sum::<f32>()
+                / 8.0
+        })
+        .collect();
+    let of_motion = blurred(&moved, 0.3, 32);
+    for rows in [MeasuredRows::All, every_other()] {
+        // What the estimator takes for it.
+        let model = Consistency::new(32, 3.0, 0.01).of_rows(&rows).unwrap();
+        let mut image = bars.clone();
+        model.agree(&of_motion, &mut image);
+        assert_eq!(image, bars);
+        assert!(model.project(&of_motion, &mut image) && image != bars, "it would be changed");
+        assert!(model.residual_ratio(&of_motion, &image) > REACHED);
+        // A blur that the model knows is no reason to leave what contradicts the readings, however far off it is.
+        let of_blur = blurred(&bars, 3.0, 32);
+        let mut image = vec![0.1; SIDE * SIDE];
+        let before = model.residual_ratio(&of_blur, &image);
+        model.agree(&of_blur, &mut image);
+        let after = model.residual_ratio(&of_blur, &image);
+        assert!(before > 5.0 && after < STUCK * before, "{before} {after}");
+    }
+}

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::AREA;
-use crate::consistency::{Consistency, MeasuredRows, MeasuredRowsError};
+use crate::consistency::{Consistency, MeasuredRows, MeasuredRowsError, clamp};
 use crate::estimate::Estimate;
 
 /// The readings of a batch, and the camera's model for each image, made once for each batch.
@@ -41,10 +41,9 @@ impl<'a> DataConstraint<'a> {
 
     /// Corrects the guess of image `index` alone.
     pub(crate) fn correct_one(&self, index: usize, guess: &mut [f32]) {
-        guess.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
-        if self.binding {
-            self.models[index].project(self.readings_of(index), guess);
-            guess.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+        match self.binding {
+            true => self.models[index].agree(self.readings_of(index), guess),
+            false => clamp(guess),
         }
     }
 

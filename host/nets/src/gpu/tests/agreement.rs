@@ -3,7 +3,7 @@
 use nirspi_gpu::agreement::BROKEN;
 
 use super::*;
-use crate::consistency::{Consistency, MeasuredRows, agreement};
+use crate::consistency::{Consistency, MeasuredRows, agreement, clamp};
 use crate::fusion;
 use crate::grid::AREA;
 use crate::random::Noise;
@@ -96,10 +96,10 @@ fn images_agree_as_on_the_processor() {
                 let Estimate { sigma_px, noise } = case.estimate;
                 let model = Consistency::new(fusion::SIDE, sigma_px, noise).of_rows(measured);
                 let model = model.unwrap();
-                let mut theirs: Vec<f32> = case.guess.iter().map(|v| v.clamp(0.0, 1.0)).collect();
-                if binding {
-                    model.project(&case.readings, &mut theirs);
-                    theirs.iter_mut().for_each(|v| *v = v.clamp(0.0, 1.0));
+                let mut theirs = case.guess.clone();
+                match binding {
+                    true => model.agree(&case.readings, &mut theirs),
+                    false => clamp(&mut theirs),
                 }
                 let what = format!("{backend}: {}, {rows}, binding: {binding}", case.what);
                 if case.what == INSIDE {
