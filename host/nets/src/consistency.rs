@@ -11,7 +11,8 @@
 //! The blur may be no Gaussian at all: that of a target that moved, of a lens out of focus, or what the estimator took for
 //! one. Then no image agrees with the readings, and the change only spoils what the network has made. The readings tell:
 //! where the new image, in [0, 1], is still farther from them than `REACHED`, and the change has taken less than 0.6 of the
-//! distance (`STUCK`), the old one stays. An image that is far off for another reason comes much nearer.
+//! distance (`STUCK`), the old one stays. An image that is far off for another reason comes much nearer. A blur that the
+//! caller knows may be that of one part of the image ([`BlurZones`](crate::BlurZones)), so there images are always moved.
 //!
 //! # Invariant
 //! An image inside the ball is not changed (`tests::inside_the_ball_nothing_changes`), nor one whose readings no image of
@@ -84,6 +85,17 @@ const BISECTIONS: usize = 22;
 static OF_IMAGE: LazyLock<Cosine<f32>> = LazyLock::new(|| Cosine::new(SIDE, SIDE));
 static OF_READINGS: LazyLock<Cosine<f32>> = LazyLock::new(|| Cosine::new(SIDE / 2, SIDE / 2));
 
+/// Whether images are moved into agreement with their readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Binding {
+    /// Images stay as they are.
+    Off,
+    /// Images stay where no image under the estimated blur has the readings.
+    OfEstimate,
+    /// The blur is known: images are moved as far as that goes.
+    OfKnownBlur,
+}
+
 /// The camera's model for one image, and the noise of its readings.
 #[derive(Debug)]
 pub struct Consistency {
@@ -153,12 +165,18 @@ impl Consistency {
         norm(&residual) / (self.noise * (self.degrees() as f32).sqrt())
     }
 
-    /// Clamps `image` to [0, 1] and moves it into agreement with its readings, where an image of this model can agree.
-    pub fn agree(&self, readings: &[f32], image: &mut [f32]) {
-        clamp(image);
+    /// Clamps `image` to [0, 1] and moves it into agreement with its readings.
+    pub fn agree(&self, readings: &[f32], image: &mut [f32], binding: Binding) {
+        image.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+        if binding == Binding::Off {
+            return;
+        }
         let before = image.to_vec();
-        if self.project(readings, image) {
-            clamp(image);
+        if !self.project(readings, image) {
+            return;
+        }
+        image.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+        if binding == Binding::OfEstimate {
             let left = self.residual_ratio(readings, image);
             if left > REACHED && left > STUCK * self.residual_ratio(readings, &before) {
                 image.copy_from_slice(&before);
@@ -241,11 +259,6 @@ impl Consistency {
             }
         }
     }
-}
-
-/// Cuts pixels off at 0 and 1.
-pub fn clamp(image: &mut [f32]) {
-    image.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
 }
 
 /// The largest lambda, from [`LEAST_LAMBDA`] up on a logarithmic scale, whose result is not

@@ -12,9 +12,9 @@ use std::num::NonZeroU32;
 
 use thiserror::Error;
 
-use crate::consistency::{MeasuredRows, MeasuredRowsError};
+use crate::consistency::{Binding, MeasuredRows, MeasuredRowsError};
 use crate::deblur::{self, DataConstraint, Deblurrer, Job, Sharpen, SharpenError};
-use crate::estimate::{Estimate, KnownEstimate};
+use crate::estimate::{Estimate, Known, KnownEstimate};
 use crate::estimator::BlurEstimator;
 use crate::fusion::{DepthMaps, Fusion};
 use crate::gate;
@@ -52,6 +52,16 @@ impl Default for Options {
             estimate: KnownEstimate::default(),
             seed: 0,
             copies: 0,
+        }
+    }
+}
+
+impl Options {
+    fn binding(&self) -> Binding {
+        match (self.consistency, self.estimate.sigma_px) {
+            (false, _) => Binding::Off,
+            (true, Known::Exactly(_)) => Binding::OfKnownBlur,
+            (true, _) => Binding::OfEstimate,
         }
     }
 }
@@ -148,7 +158,7 @@ impl Sharpener {
             let estimated = self.estimator.estimate(batch);
             let stage = Stage { deblurrer: &self.deblurrer, options, first };
             // An image of 64 x 64 was not measured by patterns of 32 x 32.
-            let (side, all, binding) = (deblur::SIDE, &MeasuredRows::All, options.consistency);
+            let (side, all, binding) = (deblur::SIDE, &MeasuredRows::All, options.binding());
             let sharp = |constraint: &DataConstraint<'_>, estimates: &[Estimate], seed| {
                 let readings = constraint.readings();
                 let job = stage.job(readings, readings, estimates, seed);
@@ -268,7 +278,7 @@ fn constraint_on<'a>(
     options: &Options,
 ) -> Result<DataConstraint<'a>, MeasuredRowsError> {
     let side = crate::fusion::SIDE;
-    DataConstraint::new(readings, side, estimates, &options.measured, options.consistency)
+    DataConstraint::new(readings, side, estimates, &options.measured, options.binding())
 }
 
 /// One batch of the deblurring stage.

@@ -12,13 +12,12 @@ use super::{
     BISECTIONS, LEAST_LAMBDA, MOST_LOG_LAMBDA, NOISE_FLOOR, OF_IMAGE, OF_READINGS, REACHED, STUCK,
     TAU,
 };
-use super::{MeasuredRows, krylov, measured};
+use super::{Binding, MeasuredRows, krylov, measured};
 use crate::estimate::{KnownEstimate, NOISE_SCALE, SIGMA_SCALE_PX};
 use crate::grid::COARSE;
 
 /// The agreement with readings of 32 x 32 that were made from these rows, for the estimator's
-/// outputs with what the caller knows, on a device with these limits. Images are moved only if it is
-/// `binding`.
+/// outputs with what the caller knows, on a device with these limits.
 ///
 /// # Errors
 /// [`GpuError::TooLarge`] if the kernel needs more than the device has.
@@ -26,7 +25,7 @@ pub(crate) fn agreement(
     engine: &dyn Kernels,
     limits: &DeviceLimits,
     rows: &MeasuredRows,
-    binding: bool,
+    binding: Binding,
     known: KnownEstimate,
 ) -> Result<Agreement, GpuError> {
     let matrices = Matrices {
@@ -39,9 +38,10 @@ pub(crate) fn agreement(
         },
     };
     let law = Law {
-        binding,
+        binding: binding != Binding::Off,
         tau: TAU,
-        reached: REACHED,
+        // No image is as far off.
+        reached: if binding == Binding::OfKnownBlur { 1e30 } else { REACHED },
         stuck: STUCK,
         noise_floor: NOISE_FLOOR,
         logs: [LEAST_LAMBDA.log10(), MOST_LOG_LAMBDA],

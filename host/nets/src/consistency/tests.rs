@@ -160,15 +160,16 @@ fn an_image_stays_where_no_image_gives_its_readings() {
         // What the estimator takes for it.
         let model = Consistency::new(32, 3.0, 0.01).of_rows(&rows).unwrap();
         let mut image = bars.clone();
-        model.agree(&of_motion, &mut image);
+        model.agree(&of_motion, &mut image, Binding::OfEstimate);
         assert_eq!(image, bars);
-        assert!(model.project(&of_motion, &mut image) && image != bars, "it would be changed");
+        model.agree(&of_motion, &mut image, Binding::OfKnownBlur);
+        assert!(image != bars, "a known blur changes it");
         assert!(model.residual_ratio(&of_motion, &image) > REACHED);
         // A blur that the model knows is no reason to leave what contradicts the readings, however far off it is.
         let of_blur = blurred(&bars, 3.0, 32);
         let mut image = vec![0.1; SIDE * SIDE];
         let before = model.residual_ratio(&of_blur, &image);
-        model.agree(&of_blur, &mut image);
+        model.agree(&of_blur, &mut image, Binding::OfEstimate);
         let after = model.residual_ratio(&of_blur, &image);
         assert!(before > 5.0 && after < STUCK * before, "{before} {after}");
     }

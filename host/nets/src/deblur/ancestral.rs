@@ -105,7 +105,7 @@ pub(super) fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::consistency::MeasuredRows;
+    use crate::consistency::{Binding, MeasuredRows};
     use crate::estimate::Estimate;
     use crate::schema::Conditions;
 
@@ -129,7 +129,7 @@ mod tests {
     /// A constraint without effect.
     fn free<'a>(job: &Job<'a>) -> DataConstraint<'a> {
         let (readings, all) = (job.seen, &MeasuredRows::All);
-        DataConstraint::new(readings, SIDE, job.estimates, all, false).unwrap()
+        DataConstraint::new(readings, SIDE, job.estimates, all, Binding::Off).unwrap()
     }
 
     #[test]

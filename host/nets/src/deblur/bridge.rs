@@ -32,7 +32,7 @@ pub(super) fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::consistency::MeasuredRows;
+    use crate::consistency::{Binding, MeasuredRows};
     use crate::estimate::Estimate;
     use crate::grid::AREA;
     use std::sync::Mutex;
@@ -57,7 +57,7 @@ mod tests {
         let estimates = [Estimate { sigma_px: 2.0, noise: 0.01 }];
         let job = Job { start: &start, seen: &start, estimates: &estimates, seed: 0, first: 0 };
         let constraint =
-            DataConstraint::new(&start, 64, &estimates, &MeasuredRows::All, false).unwrap();
+            DataConstraint::new(&start, 64, &estimates, &MeasuredRows::All, Binding::Off).unwrap();
         run(network, NonZeroU32::new(steps).unwrap(), &job, &constraint)
     }
 

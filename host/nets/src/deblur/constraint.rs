@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::AREA;
-use crate::consistency::{Consistency, MeasuredRows, MeasuredRowsError, clamp};
+use crate::consistency::{Binding, Consistency, MeasuredRows, MeasuredRowsError};
 use crate::estimate::Estimate;
 
 /// The readings of a batch, and the camera's model for each image, made once for each batch.
@@ -12,12 +12,12 @@ pub(crate) struct DataConstraint<'a> {
     models: Vec<Consistency>,
     readings: &'a [f32],
     area: usize,
-    binding: bool,
+    binding: Binding,
 }
 
 impl<'a> DataConstraint<'a> {
-    /// Readings (N, `side`, `side`) made from these Hadamard rows. A constraint that is not
-    /// `binding` changes no image, but still computes each image's inconsistency.
+    /// Readings (N, `side`, `side`) made from these Hadamard rows. A constraint that binds nothing
+    /// still computes each image's inconsistency.
     ///
     /// # Errors
     /// [`MeasuredRowsError::OtherSide`] if the rows belong to readings of another side.
@@ -26,7 +26,7 @@ impl<'a> DataConstraint<'a> {
         side: usize,
         estimates: &[Estimate],
         measured: &MeasuredRows,
-        binding: bool,
+        binding: Binding,
     ) -> Result<Self, MeasuredRowsError> {
         let model = |e: &Estimate| Consistency::new(side, e.sigma_px, e.noise).of_rows(measured);
         let models = estimates.par_iter().map(model).collect::<Result<_, _>>()?;
@@ -41,10 +41,7 @@ impl<'a> DataConstraint<'a> {
 
     /// Corrects the guess of image `index` alone.
     pub(crate) fn correct_one(&self, index: usize, guess: &mut [f32]) {
-        match self.binding {
-            true => self.models[index].agree(self.readings_of(index), guess),
-            false => clamp(guess),
-        }
+        self.models[index].agree(self.readings_of(index), guess, self.binding);
     }
 
     /// The inconsistency of each image of (N, 64, 64): its distance from the readings over their

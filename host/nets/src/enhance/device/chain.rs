@@ -191,8 +191,9 @@ impl Chain {
         let coarse = self.fsrcnn.at_once(fusion::SIDE).min(self.estimator.at_once(fusion::SIDE));
         let at_once = self.unet.at_once(SIDE).min(coarse);
         let on = self.engine.as_ref();
-        let Options { measured, consistency, estimate, .. } = options;
-        let agreement = consistency::agreement(on, &self.limits, measured, *consistency, *estimate);
+        let Options { measured, estimate, .. } = options;
+        let agreement =
+            consistency::agreement(on, &self.limits, measured, options.binding(), *estimate);
         let agreement = agreement
             .map_err(|error| self.notes.add(Note::AgreementOnCpu { why: error.to_string() }))
             .ok();
