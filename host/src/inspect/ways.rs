@@ -426,7 +426,10 @@ fn bases(contents: &Contents) -> Vec<Selection> {
 
 /// The same ways with rows that the file does not call `h_row`.
 fn with_rows(arrays: &[Array], ways: &[Selection]) -> Vec<Selection> {
-    let is_rows = |array: &&Array| array.numbers.as_ref().is_some_and(|look| look.is_rows);
+    // What counts the lines of a table is no list of rows: it would be natural order.
+    let is_rows = |array: &&Array| {
+        array.numbers.as_ref().is_some_and(|look| look.is_rows && !look.is_counter)
+    };
     let named = |array: &&Array| !array.name.is_empty() && !NO_READINGS.contains(&&*array.name);
     let (None, Some(rows)) = (array_of(arrays, "h_row"), arrays.iter().filter(named).find(is_rows))
     else {

@@ -180,6 +180,25 @@ fn lists_in_brackets_are_rows() {
 }
 
 #[test]
+fn numbers_behind_the_names_that_the_arduinos_plotter_shows_are_columns() {
+    type Columns = Vec<(String, Vec<f64>)>;
+    let columns = |content: &str| -> Result<Columns, String> {
+        let (_folder, path) = file("y.txt", content.as_bytes());
+        let read = read(&path, false).map_err(|error| line(&error, "y.txt"))?;
+        let Numbers::Columns(columns) = read.numbers else { panic!("columns") };
+        Ok(columns.into_iter().map(|(name, field)| (name, field.real)).collect())
+    };
+    let of = |name: &str, numbers: [f64; 2]| (name.to_owned(), numbers.to_vec());
+    assert_eq!(columns("A0:1.5\r\nA0:-2\r\n"), Ok(vec![of("A0", [1.5, -2.0])]));
+    let two = Ok(vec![of("light", [71.0, 72.0]), of("limit", [90.0, 90.0])]);
+    assert_eq!(columns("light:71,limit:90\nlight:72,limit:90\n"), two);
+    assert_eq!(columns("light:71\tlimit:90\n\nlight:72\tlimit:90\n"), two);
+    for other in ["A0:1\nA1:2\n", "A0:1\nA0:\n", "A0:1\nA0:1,A1:2\n", "10:02\n10:03\n"] {
+        assert!(columns(other).unwrap_err().contains(", expected "), "{other}");
+    }
+}
+
+#[test]
 fn words_of_instruments_for_no_reading_and_for_too_much() {
     let (_, numbers) = table("1.5\n--\n---\nO.L\n2\n");
     assert!(numbers[1].is_nan() && numbers[2].is_nan());
