@@ -25,7 +25,7 @@ pub(super) struct Opened {
     pub(super) every_row: Option<Rows>,
     pub(super) form: Form,
     pub(super) remedy: Remedy,
-    side_guessed: bool,
+    pub(super) side_guessed: bool,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
     pub(super) simulated: Option<bool>,
