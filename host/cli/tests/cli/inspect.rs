@@ -49,10 +49,7 @@ struct Natural {
 impl Natural {
     fn new() -> Self {
         let measured = Measured::new(16);
-        let mut y = vec![0.0; 512];
-        for (k, &row) in measured.h_row.iter().enumerate() {
-            y[2 * row as usize..][..2].copy_from_slice(&measured.y[2 * k..2 * k + 2]);
-        }
+        let y = measured.natural();
         let half = |which: usize| y.iter().copied().skip(which).step_by(2).collect();
         let (on, off) = (half(0), half(1));
         Self { measured, y, on, off }
@@ -91,6 +88,8 @@ fn the_first_command_gives_the_image() {
         ("single.npy", encode(&[256], &scene.on), "single", "natural"),
         ("dark.npy", encode(&[256], &scene.off), "single, inverted", "natural"),
         ("d.npy", encode(&[256], &scene.d()), "differences", "natural"),
+        ("spectrum.npy", encode(&[16, 16], &scene.d()), "differences", "natural"),
+        ("spectrum of pairs.npy", encode(&[16, 16, 2], y), "pairs", "natural"),
         ("zig-zag.npy", encode(&n, &shown), "pairs", "zig-zag"),
         ("part.npy", encode(&[150], &part), "single", "zig-zag"),
         ("first.npy", encode(&n, &exchanged), "pairs, complements first", "natural"),

@@ -20,6 +20,7 @@ mod effects;
 mod ends;
 mod enhance;
 mod everyday;
+mod exports;
 mod feed;
 mod foreign_devices;
 mod forms;

@@ -6,11 +6,7 @@ use nirspi::files::npy;
 /// The readings of the phantom, 16 x 16, natural order, as an array alone.
 fn phantom(bench: &Bench, change: impl Fn(Vec<f32>) -> Vec<f32>) -> Measured {
     let measured = Measured::new(16);
-    let mut y = vec![0.0; 512];
-    for (k, &row) in measured.h_row.iter().enumerate() {
-        y[2 * row as usize..][..2].copy_from_slice(&measured.y[2 * k..2 * k + 2]);
-    }
-    let y = change(y);
+    let y = change(measured.natural());
     bench.write("in.npy", &npy::encode(&[y.len()], &y));
     measured
 }
