@@ -332,9 +332,15 @@ impl Separators {
             return decimal(between, '.');
         }
         if has('.') {
-            return match between {
-                None => decimal(Some(','), '.'),
-                Some(_) => Err(FileError::field(
+            // A date has points, too.
+            let words = body.iter().take(1).flat_map(|(_, line)| Words::of(line, between, true));
+            let shows =
+                |mark| words.clone().any(|word| word.contains(mark) && parse(word, mark).is_some());
+            return match (between, shows('.'), shows(',')) {
+                (None, ..) => decimal(Some(','), '.'),
+                (_, true, false) => decimal(between, '.'),
+                (_, false, true) => decimal(between, ','),
+                _ => Err(FileError::field(
                     path,
                     "table",
                     "has points and commas in its numbers",

@@ -4,9 +4,9 @@ use crate::bench::{Bench, Measured, correlation};
 use std::fmt::Write as _;
 
 /// A file of an instrument: its name, its text, the field of the readings if it has several, and what a note says.
-struct Export {
-    file: &'static str,
-    text: String,
+pub struct Export {
+    pub file: &'static str,
+    pub text: String,
     field: Option<&'static str>,
     note: &'static str,
 }
@@ -71,7 +71,7 @@ const LABVIEW: &str = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\
 const DIGILENT: &str = "#Digilent WaveForms Oscilloscope Acquisition\n#Device Name: Discovery2\n\
     #Sample rate: 1000Hz\n\nTime (s),Channel 1 (V)\n";
 
-fn exports(y: &[f32]) -> Vec<Export> {
+pub fn exports(y: &[f32]) -> Vec<Export> {
     let export = |file, text, note| Export { file, text, field: None, note };
     let of = |field, export: Export| Export { field: Some(field), ..export };
     let noise = |at: usize| 0.01 * ((at * at * 31 + at * 7) % 97) as f32;

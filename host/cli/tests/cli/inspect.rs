@@ -1,11 +1,11 @@
 //! What a file holds, and the command that reconstructs it.
 
 use crate::bench::{Bench, Measured, correlation, npz};
+use crate::cases::cases;
 use nirspi::files::npy::{encode, read_stack};
 use nirspi_recon::{Order, Side};
 use std::fmt::Write as _;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The words of a command, as a shell reads them.
 fn shell(command: &str) -> Vec<String> {
@@ -300,17 +300,6 @@ fn what_is_no_file_of_readings_is_one_line() {
         (&report["arrays"][0]["missing"], &report["guesses"][0]["patterns"]),
         (&1.into(), &255.into())
     );
-}
-
-/// Inputs of the benches of others, beside the shared data; they are not part of this repository.
-fn cases() -> Option<PathBuf> {
-    let data = std::env::var_os("NIRSPI_DATA").map(PathBuf::from);
-    let folder = data.map(|data| data.join("../cases/readings")).filter(|folder| folder.is_dir());
-    if folder.is_none() {
-        let _ =
-            writeln!(std::io::stderr(), "skipped: no inputs (../cases/readings of NIRSPI_DATA)");
-    }
-    folder
 }
 
 #[test]

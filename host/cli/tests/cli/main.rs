@@ -12,6 +12,7 @@ mod calibrate;
 mod camera_model;
 mod capture_files;
 mod capture_tcp;
+mod cases;
 mod demo;
 mod dishonest_cameras;
 mod doors;

@@ -56,8 +56,17 @@ pub(super) fn find(
     let Table { separators, width, numeric, columns, words, ends } = table;
     let (before, after) = (&lines[..body.start], &lines[body.end..]);
     let number = |word: &str| parse(word, separators.decimal);
-    let is_row = |(_, line): &Line<'_>| is_row(line, &separators, width, &numeric);
-    if numeric.is_empty() || before.iter().chain(after).any(is_row) {
+    // Beside a number, a preamble has a name where the table has a time.
+    let has_digit = |word: &str| word.contains(|c: char| c.is_ascii_digit());
+    let of_table = |(_, line): &Line<'_>| {
+        let mut beside = cells(line, separators.between)
+            .zip(cells(lines[body.start].1, separators.between))
+            .enumerate()
+            .filter(|(at, _)| !numeric.contains(at));
+        is_row(line, &separators, width, &numeric)
+            && beside.all(|(_, (one, other))| has_digit(one) == has_digit(other))
+    };
+    if numeric.is_empty() || before.iter().chain(after).any(of_table) {
         return None;
     }
     let (heading, units) = heading(before, separators.between, &numeric, number);
@@ -369,6 +378,14 @@ mod tests {
         assert_eq!(found, [expected("Samples", k), expected("Power (W)", y)]);
         let told = "3 lines before the table; columns that hold words: `Date`, `Time`";
         assert!(skipped.ends_with(told), "{skipped}");
+        // A preamble with numbers, above times.
+        let text = format!(
+            "t0\t10:00:00\ndelta t\t1,5E-3\n\ntime\ty\n{}",
+            rows(|k| format!("10:00:0{k}\t{},5", 8 - k))
+        );
+        let (found, skipped) = columns(&text);
+        assert_eq!(found, [expected("y", y)]);
+        assert!(skipped.ends_with("2 lines before the table; columns that hold words: `time`"));
         // A serial monitor.
         let (found, _) = columns(&rows(|k| format!("14:02:0{k}.000 -> {}", y(k))));
         assert_eq!(found, [expected("[9, 1]", y)]);
@@ -463,6 +480,8 @@ mod tests {
             format!("{}3,4,5\n1,2.5\n", rows(|k| format!("{k},1.5"))),
             // A word in the middle of a column of numbers.
             format!("a,b\n{}3,x\n{}", rows(|k| format!("{k},1.5")), rows(|k| format!("{k},2.5"))),
+            // A line of the table behind another one, with a word beside its number.
+            format!("{}lost\nk 9,1.5\n", rows(|k| format!("k {k},1.5"))),
             // More lines behind the table than a footer has.
             format!("{}end\n of\nthe\nlog\n", rows(|k| format!("{k},1.5"))),
         ] {

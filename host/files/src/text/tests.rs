@@ -121,6 +121,11 @@ fn a_decimal_comma_is_seen_where_the_file_shows_it_and_asked_for_where_not() {
     let (_folder, path) = file("y.csv", b"h_row,d\n0,15\n3,-4\n");
     let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else { panic!("columns") };
     assert_eq!(columns[1].1.real, [15.0, -4.0]);
+    // A date is no number with points.
+    let (_folder, path) =
+        file("y.txt", ("t;y\n".to_owned() + &"20.11.2026 10:00;1,5\n".repeat(8)).as_bytes());
+    let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else { panic!("columns") };
+    assert_eq!((&*columns[0].0, columns[0].1.real.last()), ("y", Some(&1.5)));
     let (_folder, path) = file("y.txt", b"1,5;2.5\n");
     assert!(line(&read(&path, false).err().unwrap(), "y.txt").contains("points and commas"));
 }
