@@ -423,6 +423,10 @@ mod tests {
                 assert_eq!(columns(&format!("time,{name}\n{text}")).0, wanted);
             }
         }
+        for name in ["Power 1550 nm (W)", "Phase offset: 2/3 pi"] {
+            let text = format!("time,{name}\n{}", rows(|k| format!("{k},{}", y(k))));
+            assert_eq!(columns(&text).0, [expected("time", k), expected(name, y)]);
+        }
         // A name may begin with any letter.
         let text = format!("µs;y\n{}", rows(|k| format!("{k};{}", y(k))));
         assert_eq!(columns(&text).0, [expected("µs", k), expected("y", y)]);

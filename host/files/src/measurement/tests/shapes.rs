@@ -166,6 +166,16 @@ fn a_pattern_that_was_shown_several_times_has_the_mean_of_its_readings() {
     assert_eq!(all[1].readings, Readings::Differential(vec![2.0, 1.0, 1.0]));
 }
 
+/// White references have no row, and are no patterns: there may be more readings than the image has pixels.
+#[test]
+fn rows_below_zero_are_left_out_before_patterns_are_counted() {
+    let rows = npy_i32("(7,)", &[-1, 0, 1, -1, 2, 3, -1]);
+    let d = vec![("d.npy", npy_f64("(7,)", &[99.0, 8.0, 2.0, 99.0, -0.5, 4.0, 99.0]))];
+    let found = of(rows, d, &as_is()).unwrap();
+    assert_eq!((&*found.h_row, found.not_read), (&[0, 1, 2, 3][..], vec![0, 3, 6]));
+    assert_eq!(found.readings, Readings::Differential(vec![8.0, 2.0, -0.5, 4.0]));
+}
+
 #[test]
 fn one_pattern_is_a_measurement_however_many_axes_it_has() {
     for shape in ["(1,)", "(1, 1)"] {
