@@ -3,12 +3,14 @@
 //! The file is read into memory whole. A limit bounds the memory for a field, whatever size the
 //! file claims.
 
+mod lzf;
+
 use super::FileError;
 use super::array::{MAX_AXES, has_shape, within_memory};
 use super::field::Field;
 use hdf5_reader::error::Error;
 use hdf5_reader::messages::datatype::{CompoundField, Datatype};
-use hdf5_reader::{ByteOrder, Hdf5File, OpenOptions};
+use hdf5_reader::{ByteOrder, FilterRegistry, Hdf5File, OpenOptions};
 use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "an HDF5 file";
@@ -33,7 +35,11 @@ impl Hdf5 {
             let lengths = format!("{found} bytes, {expected} by its superblock");
             return Err(damaged(path, lengths));
         }
+        let mut filters = FilterRegistry::new();
+        let lzf = |filter: &_, packed: &[u8], _| lzf::unpacked(filter, packed, MAX_FIELD_BYTES);
+        filters.register(lzf::LZF, Box::new(lzf));
         let options = OpenOptions::default()
+            .with_filter_registry(filters)
             .with_max_chunk_bytes(MAX_FIELD_BYTES)
             .with_max_read_bytes(MAX_FIELD_BYTES);
         let file = Hdf5File::from_vec_with_options(bytes, options)
