@@ -131,6 +131,21 @@ impl FileError {
         Self::Field { path: path.to_owned(), field, found, expected }
     }
 
+    /// A file that is damaged or ends too early.
+    pub(crate) fn damaged(path: &Path, found: String, expected: &'static str) -> Self {
+        Self::Damaged { path: path.to_owned(), found, expected }
+    }
+
+    /// A file without a field, which has others.
+    pub(crate) fn missing(
+        path: &Path,
+        field: &'static str,
+        found: &[String],
+        expected: &'static str,
+    ) -> Self {
+        Self::Missing { path: path.to_owned(), field, found: found.to_vec(), expected }
+    }
+
     /// A file that is something else than expected.
     pub fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {
         Self::Kind { path: path.to_owned(), found: found.into(), expected }

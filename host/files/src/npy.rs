@@ -71,12 +71,7 @@ pub struct Pictures {
 }
 
 fn refuse(path: &Path, found: String, expected: &str) -> FileError {
-    FileError::Field {
-        path: path.to_owned(),
-        field: FIELD.into(),
-        found,
-        expected: expected.to_owned(),
-    }
+    FileError::field(path, FIELD, found, expected)
 }
 
 fn finite(path: &Path, stack: Stack) -> Result<Stack, FileError> {
@@ -176,7 +171,7 @@ fn read_array<D>(
         return Err(FileError::kind(path, kind_by_start(&start), expected));
     }
 
-    let damaged = |found| FileError::Damaged { path: path.to_owned(), found, expected };
+    let damaged = |found| FileError::damaged(path, found, expected);
     let explain = |error| match error {
         ArrayError::Damaged(found) => damaged(found),
         ArrayError::Dtype(found) => refuse(path, found, NUMBERS),

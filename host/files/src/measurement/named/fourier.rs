@@ -148,19 +148,15 @@ fn each_of(field: Field) -> Vec<Field> {
 }
 
 /// The measurement of this index, along the first axis.
-fn one_of(mut field: Field, index: Option<usize>) -> Result<Field, (String, String)> {
+fn one_of(field: Field, index: Option<usize>) -> Result<Field, (String, String)> {
     let Some(index) = index else { return Ok(field) };
-    let several = field.shape.first().copied().unwrap_or(1);
-    if field.shape.len() < 2 || index >= several {
-        let found = format!("has shape {:?} for --index {index}", field.shape);
+    let shape = field.shape.clone();
+    let mut all = each_of(field);
+    if shape.len() < 2 || index >= all.len() {
+        let found = format!("has shape {shape:?} for --index {index}");
         return Err((found, "several measurements along the first axis".to_owned()));
     }
-    let each = field.real.len() / several;
-    let part = index * each..(index + 1) * each;
-    field.real = field.real[part.clone()].to_vec();
-    field.imaginary = field.imaginary.map(|imaginary| imaginary[part].to_vec());
-    field.shape.remove(0);
-    Ok(field)
+    Ok(all.swap_remove(index))
 }
 
 /// The size of the image and the columns of the spectrum for this many frequencies.
