@@ -77,6 +77,14 @@ pub struct Reading {
     pub lamp: Option<Lamp>,
 }
 
+impl Reading {
+    /// Measurements without drop-outs, dark level and lamp.
+    fn of(measurements: Measurements, outliers: Vec<Outlier>, doubts: Vec<Doubt>) -> Self {
+        let (dropouts, dark_level, lamp) = (Vec::new(), None, None);
+        Self { measurements, dropouts, outliers, doubts, dark_level, lamp }
+    }
+}
+
 /// Where patterns are in a recording of which some were not read.
 #[derive(Debug, Clone, Copy)]
 pub struct Places<'p> {
@@ -130,15 +138,7 @@ pub fn read_at(
             Form::Single => Measurements::from_single(rows, y)?,
             Form::Differences => Measurements::from_differential(rows, y)?,
         };
-        let (dropouts, outliers) = (Vec::new(), Vec::new());
-        return Ok(Reading {
-            measurements,
-            dropouts,
-            outliers,
-            doubts: vec![doubt],
-            dark_level: None,
-            lamp: None,
-        });
+        return Ok(Reading::of(measurements, Vec::new(), vec![doubt]));
     }
     match claim.form {
         Form::Pairs | Form::Halves => pairs::read(rows, y, claim, places),

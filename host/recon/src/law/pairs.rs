@@ -71,15 +71,7 @@ pub(super) fn read(
         // A finding about single readings would rest on the wrong partner.
         if !doubt.is_of_sign() {
             let measurements = differences(rows, pairs, |_| true)?;
-            let (dropouts, outliers) = (Vec::new(), Vec::new());
-            return Ok(Reading {
-                measurements,
-                dropouts,
-                outliers,
-                doubts,
-                dark_level: None,
-                lamp: None,
-            });
+            return Ok(Reading::of(measurements, Vec::new(), doubts));
         }
     }
     let upright: Vec<[f64; 2]> = match other {

@@ -63,13 +63,7 @@ pub(super) fn read_single(
         let many = beyond(MANY_SIGMAS).len();
         let above = beyond(LAW_SIGMAS);
         if above.len() <= few(y.len()) && many <= y.len() / 10 {
-            let outlier = |&k: &usize| Outlier {
-                reading: k,
-                value: y[k],
-                row: rows[k],
-                why: Impossible::AboveAllOn { all_on: on },
-            };
-            outliers = above.iter().map(outlier).collect();
+            outliers = above_all_on(rows, y, &above, on);
             doubts.extend(clipped(y, on));
         } else {
             let broken = Broken { readings: y.len(), above: many, below: 0 };
@@ -97,7 +91,7 @@ pub(super) fn read_single(
             }
         }
     }
-    Ok(Reading { measurements, dropouts: Vec::new(), outliers, doubts, dark_level, lamp: None })
+    Ok(Reading { dark_level, ..Reading::of(measurements, outliers, doubts) })
 }
 
 pub(super) fn read_differences(
@@ -139,25 +133,20 @@ pub(super) fn read_differences(
             let explanation = Explanation::Inverted;
             doubts.push(Doubt::Form { claimed: Form::Differences, broken, explanation });
         } else {
-            let outlier = |&k: &usize| Outlier {
-                reading: k,
-                value: d[k],
-                row: rows[k],
-                why: Impossible::AboveAllOn { all_on: on },
-            };
-            outliers = larger.iter().map(outlier).collect();
+            outliers = above_all_on(rows, d, &larger, on);
         }
     }
     let (rows, d) = without(rows, d, &outliers);
     let measurements = Measurements::from_differential(&rows, &d)?;
-    Ok(Reading {
-        measurements,
-        dropouts: Vec::new(),
-        outliers,
-        doubts,
-        dark_level: None,
-        lamp: None,
-    })
+    Ok(Reading::of(measurements, outliers, doubts))
+}
+
+/// Values that are above that of the all-on pattern.
+fn above_all_on(rows: &Rows, values: &[f64], which: &[usize], all_on: f64) -> Vec<Outlier> {
+    let why = Impossible::AboveAllOn { all_on };
+    let of =
+        |&reading: &usize| Outlier { reading, value: values[reading], row: rows[reading], why };
+    which.iter().map(of).collect()
 }
 
 /// The position of a difference that stands out from all others, if there is one.
