@@ -28,10 +28,7 @@ pub(super) fn shown(
         true => Err("readings".to_owned()),
         false => Ok(()),
     })?;
-    let spectrum = match want.index {
-        None => spectrum(&shape, side, form).map(|n| [n, n]),
-        Some(_) => None,
-    };
+    let spectrum = spectrum(&shape, side, form, want.index).map(|n| [n, n]);
     let shape = match want.patterns_first {
         true => shape,
         false => joined(&shape, spectrum.as_ref().map(|axes| &axes[..]), form),
@@ -90,18 +87,19 @@ pub(super) fn shown(
 }
 
 /// The side of a spectrum, `(..., n, n)` readings or `(..., n, n, 2)` pairs: the side that the user states, or a side
-/// of whose square no measurement of n patterns is a full sweep.
-fn spectrum(shape: &[u64], side: Option<Side>, form: Form) -> Option<u64> {
+/// of whose square no measurement of n patterns is a full sweep. One of (n, n) by its index is no spectrum.
+fn spectrum(shape: &[u64], side: Option<Side>, form: Form, index: Option<usize>) -> Option<u64> {
     let axes: Vec<u64> = shape.iter().copied().filter(|&axis| axis != 1).collect();
     let axes = match form {
         Form::Pairs => axes.strip_suffix(&[2])?,
         Form::Single | Form::Differences => &axes,
         Form::Halves => return None,
     };
-    let [.., height, width] = *axes else { return None };
-    let n = Side::new(width).ok().filter(|_| height == width)?;
+    let [before @ .., height, width] = axes else { return None };
+    let n = Side::new(*width).ok().filter(|_| height == width)?;
     let is_sweep = Side::new(width.isqrt()).is_ok_and(|side| side.area() == n.pixels());
-    side.map_or(!is_sweep, |side| side == n).then_some(width)
+    let is_said = |side| side == n && (index.is_none() || !before.is_empty());
+    side.map_or(!is_sweep, is_said).then_some(*width)
 }
 
 pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<Side>, FileError> {

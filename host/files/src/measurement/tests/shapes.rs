@@ -75,7 +75,14 @@ fn a_spectrum_alone_is_known_by_its_side() {
         assert!(told.contains(both), "{told}");
         assert_eq!(alone(shape, count, form, None, Some(3)), Ok((4, false)), "{shape}");
     }
-    // No spectrum: halves, patterns along the first axis, other sides.
+    // Several spectra are chosen by their index.
+    for (shape, count, side) in [("(3, 8, 8)", 192, None), ("(3, 16, 16)", 768, Some(16))] {
+        let told = alone(shape, count, Form::Single, side, None).unwrap_err();
+        assert!(told.ends_with("choose one with --index 0..2"), "{told}");
+        let (n, _) = alone(shape, count, Form::Single, side, Some(2)).unwrap();
+        assert_eq!(3 * n * n, count as usize, "{shape}");
+    }
+    // No spectrum: halves, other sides.
     assert!(alone("(8, 8)", 64, Form::Halves, None, None).is_err());
     assert!(
         alone("(8, 8)", 64, Form::Single, Some(16), None).unwrap_err().contains("--index 0..7")
