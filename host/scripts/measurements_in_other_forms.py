@@ -75,6 +75,38 @@ case("car_v73.mat", hadamard(d_all[first], car_rows, m), "--patterns-first", "--
 with h5py.File(out / "wing.h5", "w") as file:
     file["n"], file["h_row"], file["y"] = n, rows, y
 case("wing.h5", full)
+# Filters and types of HDF5; the wing's readings in steps of a thousandth of their range.
+counts = np.rint(30_000 * (y - y.min()) / np.ptp(y)).astype(np.int16)
+counted = hadamard(counts[0::2].astype(np.float64) - counts[1::2], rows, n)
+for name, options in {
+    "lzf": {"compression": "lzf", "shuffle": True},
+    "gzip": {"compression": "gzip", "shuffle": True, "fletcher32": True},
+    "fletcher32": {"fletcher32": True},
+    "scaleoffset": {"scaleoffset": 0},
+    "big-endian": {"dtype": ">i2"},
+}.items():
+    with h5py.File(out / f"{name}.h5", "w", libver="latest" if name == "gzip" else None) as file:
+        file["run/n"], file["run/h_row"] = n, rows
+        file.create_dataset("run/adc", data=counts, chunks=(1000,), **options)
+    case(f"{name}.h5", counted, "--field", "run/adc")
+# Structures and cells of MATLAB, and its level 4.
+scipy.io.savemat(out / "struct.mat", {"run": {"n": n, "h_row": rows, "adc": {"y": y}}})
+case("struct.mat", full, "--field", "run.adc.y,h_row=run.h_row,n=run.n")
+scipy.io.savemat(out / "v4.mat", {"n": n, "h_row": rows.astype(np.float64), "y": y}, format="4")
+case("v4.mat", full)
+# Types, byte orders and axes of NumPy.
+whole = counts.astype(np.int64) + 1
+for at, array in enumerate([
+    counts,
+    whole.astype(np.uint16),
+    whole.astype(">f4"),
+    whole.astype(np.uint64) + 2**40,
+    np.asfortranarray(whole.reshape(-1, 2)),
+    whole.reshape(-1, 1),
+    whole.reshape(1, 1, -1, 1),
+]):
+    np.save(out / f"array{at}.npy", array)
+    case(f"array{at}.npy", counted, "--shown", "zig-zag")
 scipy.io.savemat(out / "named.mat", {"measurements": y, "order": rows})
 case("named.mat", full, "--field", "measurements", "--shown", "zig-zag")
 

@@ -2,9 +2,10 @@
 
     python host/scripts/small_files.py
 
-Writes host/files/src/small/: n = 2, h_row = 0, 3, 1 and y = 5, 1, 2, 3, 4, 4.5, a complex array z of 2 x 3, and a text. Needs numpy,
-scipy and h5py. nested.mat and nested.h5 have n and h_row in a structure or group `run`, y in `run.adc`. claims.h5 claims an array that takes more memory than a reader
-allows.
+Writes host/files/src/small/: n = 2, h_row = 0, 3, 1 and y = 5, 1, 2, 3, 4, 4.5, a complex array z of 2 x 3,
+and a text. Needs numpy, scipy and h5py. nested.mat and nested.h5 have n and h_row in a structure or group
+`run`, y in `run.adc`. lzf.h5 is packed by h5py's own filter. claims.h5 claims an array that takes more memory
+than a reader allows.
 """
 
 from pathlib import Path
@@ -48,6 +49,11 @@ with h5py.File(OUT / "h5py.h5", "w") as file:
     for name, array in REAL.items():
         file[name] = array
     file["z"] = COMPLEX.astype(np.complex64)
+    file["text"] = "some words"
+with h5py.File(OUT / "lzf.h5", "w", libver="latest") as file:
+    for name, array in (REAL | {"z": COMPLEX.astype(np.complex64)}).items():
+        packed = {"chunks": array.shape, "compression": "lzf"} if np.size(array) > 1 else {}
+        file.create_dataset(name, data=array, **packed)
     file["text"] = "some words"
 with h5py.File(OUT / "claims.h5", "w", libver="latest") as file:
     # Never written: the file has no chunk of it.

@@ -13,7 +13,7 @@ use crate::moving::followed;
 use crate::provenance::Taken;
 use crate::recording::RecordingError;
 use crate::tally::Misfit;
-use nirspi_recon::law::{self, Claim, Doubt, Lamp, Reading};
+use nirspi_recon::law::{self, Claim, Doubt, Lamp, Places, Reading};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{
     Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, reconstruct,
@@ -450,7 +450,11 @@ pub(crate) fn by_law(
     Ok(match (&file.imaginary, part) {
         (None, _) => {
             let y = file.readings.values();
-            let mut read = law::read(&file.h_row, y, file.claim).map_err(wrong)?;
+            // Of patterns that were shown several times, readings are in no order.
+            let is_in_order = file.places.len() + file.not_read.len() == file.patterns;
+            let places = Places { read: &file.places, patterns: file.patterns };
+            let places = Some(places).filter(|_| is_in_order);
+            let mut read = law::read_at(&file.h_row, y, file.claim, places).map_err(wrong)?;
             if let Some(noise) = file.noise {
                 read.measurements = read.measurements.with_noise(noise).map_err(wrong)?;
             }

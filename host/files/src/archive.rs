@@ -14,11 +14,11 @@ use super::array::{
 };
 use super::field::Field;
 use super::npy;
-use super::plain::{kind_by_start, open_file};
+use super::plain::{kind_by_start, open_start};
 use super::stored::{EXPECTED, Stored, damaged};
 pub use members::{Members, write_members};
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read, Seek};
+use std::io::{BufReader, Cursor};
 use std::path::{Path, PathBuf};
 use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
@@ -58,13 +58,7 @@ impl Archive {
     /// # Errors
     /// [`FileError`] for a file of another kind, and for a damaged one.
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        let (mut file, _) = open_file(path, EXPECTED)?;
-        let mut start = Vec::new();
-        file.by_ref()
-            .take(8)
-            .read_to_end(&mut start)
-            .and_then(|_| file.rewind())
-            .map_err(|error| FileError::io(path, "read", error))?;
+        let (file, _, start) = open_start(path, EXPECTED, 8)?;
         if !start.starts_with(b"PK") {
             return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
         }

@@ -45,14 +45,14 @@ pub(super) enum ArrayError {
 
 /// A numeric type of NumPy: `|b1`, `i1..i8`, `u1..u8`, `f2..f8`, `c8`, `c16`, in either byte order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Dtype {
-    kind: Kind,
-    size: usize,
-    big_endian: bool,
+pub(super) struct Dtype {
+    pub(super) kind: Kind,
+    pub(super) size: usize,
+    pub(super) big_endian: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     Bool,
     Signed,
     Unsigned,
@@ -428,7 +428,8 @@ impl Dtype {
         Ok(Self { kind, size, big_endian })
     }
 
-    fn decode<T: Sample>(self, bytes: &[u8]) -> Vec<T> {
+    /// The numbers in these bytes.
+    pub(super) fn decode<T: Sample>(self, bytes: &[u8]) -> Vec<T> {
         let mut values = vec![T::from_f64(0.0); bytes.len() / self.size];
         self.decode_into(bytes, &mut values);
         values

@@ -98,7 +98,7 @@ pub enum FileError {
     },
     /// The file holds several measurements, and the caller chose none or an index that is too
     /// large.
-    #[error("{}: `{}` holds {}", Shown::path(path), Shown::text(field), choice(*count, *asked))]
+    #[error("{}: `{}` holds {}", Shown::path(path), Shown::text(field), choice(*count, *asked, *is_square))]
     Choice {
         /// The file.
         path: PathBuf,
@@ -108,6 +108,8 @@ pub enum FileError {
         count: usize,
         /// The index that the caller chose.
         asked: Option<usize>,
+        /// Whether they may be one spectrum, with as many rows as columns.
+        is_square: bool,
     },
 }
 
@@ -129,20 +131,41 @@ impl FileError {
         Self::Field { path: path.to_owned(), field, found, expected }
     }
 
+    /// A file that is damaged or ends too early.
+    pub(crate) fn damaged(path: &Path, found: String, expected: &'static str) -> Self {
+        Self::Damaged { path: path.to_owned(), found, expected }
+    }
+
+    /// A file without a field, which has others.
+    pub(crate) fn missing(
+        path: &Path,
+        field: &'static str,
+        found: &[String],
+        expected: &'static str,
+    ) -> Self {
+        Self::Missing { path: path.to_owned(), field, found: found.to_vec(), expected }
+    }
+
     /// A file that is something else than expected.
     pub fn kind(path: &Path, found: impl Into<String>, expected: &'static str) -> Self {
         Self::Kind { path: path.to_owned(), found: found.into(), expected }
     }
 }
 
-fn choice(count: usize, asked: Option<usize>) -> String {
+fn choice(count: usize, asked: Option<usize>, is_square: bool) -> String {
     let measurements =
         if count == 1 { "1 measurement".to_owned() } else { format!("{count} measurements") };
     let asked =
         asked.map(|index| format!(", found no index {index} among them")).unwrap_or_default();
     match count {
         0 | 1 => format!("{measurements}{asked}, expected --index 0 or none"),
-        _ => format!("{measurements}{asked}: choose one with --index 0..{}", count - 1),
+        _ => {
+            let spectrum = match is_square {
+                true => format!(", or say --side {count} for one spectrum of {count} x {count}"),
+                false => String::new(),
+            };
+            format!("{measurements}{asked}: choose one with --index 0..{}{spectrum}", count - 1)
+        }
     }
 }
 

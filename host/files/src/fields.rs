@@ -12,7 +12,7 @@ use super::hdf5::Hdf5;
 use super::mat::Mat;
 use super::mat4::Mat4;
 use super::npy;
-use super::plain::{is_mat_4, kind_by_start, open_file};
+use super::plain::{is_mat_4, kind_by_start, open_file, open_start};
 use super::stored::Stored;
 use super::text;
 use super::wav;
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub(super) const UNNAMED: &str = "array";
 /// Number of first bytes that identify the format. An HDF5 file may begin after a block of 512
 /// bytes.
-const START_BYTES: u64 = 520;
+const START_BYTES: usize = 520;
 const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// The largest `.mat` or HDF5 file taken into memory.
 const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -61,12 +61,7 @@ enum Format {
 impl Fields {
     /// Opens a file of any of the formats. `decimal_comma` applies to text files only.
     pub(super) fn open(path: &Path, decimal_comma: bool) -> Result<Self, FileError> {
-        let (mut file, length) = open_file(path, EXPECTED)?;
-        let mut start = Vec::new();
-        file.by_ref()
-            .take(START_BYTES)
-            .read_to_end(&mut start)
-            .map_err(|error| FileError::io(path, "read", error))?;
+        let (_, length, start) = open_start(path, EXPECTED, START_BYTES)?;
         let (mut skipped, mut is_text) = (None, false);
         let is_wav = wav::is_start(&start);
         let (names, format) = if start.starts_with(b"PK") {

@@ -3,12 +3,14 @@
 //! The file is read into memory whole. A limit bounds the memory for a field, whatever size the
 //! file claims.
 
+mod lzf;
+
 use super::FileError;
-use super::array::{MAX_AXES, has_shape, within_memory};
+use super::array::{Dtype, Kind, MAX_AXES, has_shape, within_memory};
 use super::field::Field;
 use hdf5_reader::error::Error;
 use hdf5_reader::messages::datatype::{CompoundField, Datatype};
-use hdf5_reader::{ByteOrder, Hdf5File, OpenOptions};
+use hdf5_reader::{ByteOrder, FilterRegistry, Hdf5File, OpenOptions};
 use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "an HDF5 file";
@@ -33,7 +35,11 @@ impl Hdf5 {
             let lengths = format!("{found} bytes, {expected} by its superblock");
             return Err(damaged(path, lengths));
         }
+        let mut filters = FilterRegistry::new();
+        let lzf = |filter: &_, packed: &[u8], _| lzf::unpacked(filter, packed, MAX_FIELD_BYTES);
+        filters.register(lzf::LZF, Box::new(lzf));
         let options = OpenOptions::default()
+            .with_filter_registry(filters)
             .with_max_chunk_bytes(MAX_FIELD_BYTES)
             .with_max_read_bytes(MAX_FIELD_BYTES);
         let file = Hdf5File::from_vec_with_options(bytes, options)
@@ -106,11 +112,11 @@ impl Hdf5 {
         within_memory(&self.path, field, &stored, parts.1.is_some())?;
         let bytes = data.read_raw_bytes().map_err(explain)?;
         let count = stored.iter().try_fold(1_u64, |product, &axis| product.checked_mul(axis));
-        let elements = bytes.chunks_exact(element_bytes);
-        if count != Some(elements.len() as u64) {
-            return Err(damaged(&self.path, format!("`{field}`: {} numbers", elements.len())));
+        let found = bytes.len() / element_bytes;
+        if count != Some(found as u64) {
+            return Err(damaged(&self.path, format!("`{field}`: {found} numbers")));
         }
-        let part = |part: &Part| -> Vec<f64> { elements.clone().map(|e| part.number(e)).collect() };
+        let part = |part: &Part| part.numbers(&bytes, element_bytes);
         let (real, imaginary) = (part(&parts.0), parts.1.as_ref().map(part));
         let shape = shape.iter().map(|&axis| axis as usize).collect();
         Ok(match self.is_matlab {
@@ -150,46 +156,34 @@ fn cut_at(bytes: &[u8]) -> Option<(u64, u64)> {
 #[derive(Clone, Copy)]
 struct Part {
     offset: usize,
-    size: usize,
-    is_float: bool,
-    is_signed: bool,
-    is_big_endian: bool,
+    dtype: Dtype,
 }
 
 impl Part {
     fn of(datatype: &Datatype, offset: usize) -> Option<Self> {
-        let (size, is_float, is_signed, order) = match datatype {
-            Datatype::FixedPoint { size, signed, byte_order } => {
-                (*size, false, *signed, *byte_order)
+        let (size, kind, order) = match datatype {
+            Datatype::FixedPoint { size, signed: true, byte_order } => {
+                (*size, Kind::Signed, *byte_order)
             }
-            Datatype::FloatingPoint { size, byte_order } => (*size, true, true, *byte_order),
+            Datatype::FixedPoint { size, byte_order, .. } => (*size, Kind::Unsigned, *byte_order),
+            Datatype::FloatingPoint { size, byte_order } => (*size, Kind::Float, *byte_order),
             // h5py stores truth values as enumerations.
             Datatype::Enum { base, .. } => return Self::of(base, offset),
             _ => return None,
         };
-        let size = usize::from(size);
-        let known = if is_float { [4, 8].contains(&size) } else { [1, 2, 4, 8].contains(&size) };
-        let is_big_endian = order == ByteOrder::BigEndian;
-        known.then_some(Self { offset, size, is_float, is_signed, is_big_endian })
+        let known = if kind == Kind::Float { &[4, 8][..] } else { &[1, 2, 4, 8] };
+        let big_endian = order == ByteOrder::BigEndian;
+        let dtype = Dtype { kind, size: usize::from(size), big_endian };
+        known.contains(&size).then_some(Self { offset, dtype })
     }
 
-    fn number(&self, element: &[u8]) -> f64 {
-        let mut bytes = [0; 8];
-        for (at, byte) in element[self.offset..self.offset + self.size].iter().enumerate() {
-            bytes[if self.is_big_endian { self.size - 1 - at } else { at }] = *byte;
-        }
-        let word = u64::from_le_bytes(bytes);
-        match (self.is_float, self.size) {
-            (true, 4) => f64::from(f32::from_bits(word as u32)),
-            (true, _) => f64::from_bits(word),
-            (false, size) => {
-                let unused = 64 - 8 * size as u32;
-                if self.is_signed {
-                    ((word << unused) as i64 >> unused) as f64
-                } else {
-                    word as f64
-                }
-            }
+    /// The numbers in elements of so many bytes.
+    fn numbers(&self, elements: &[u8], each: usize) -> Vec<f64> {
+        let Self { offset, dtype } = self;
+        let of = |element: &[u8]| element[*offset..offset + dtype.size].to_vec();
+        match each == dtype.size {
+            true => dtype.decode(elements),
+            false => dtype.decode(&elements.chunks_exact(each).flat_map(of).collect::<Vec<u8>>()),
         }
     }
 }
@@ -199,7 +193,7 @@ impl Part {
 fn parts(datatype: &Datatype) -> Option<(usize, (Part, Option<Part>))> {
     let Datatype::Compound { size, fields } = datatype else {
         let part = Part::of(datatype, 0)?;
-        return Some((part.size, (part, None)));
+        return Some((part.dtype.size, (part, None)));
     };
     let [real, imaginary] = &fields[..] else { return None };
     let named = |field: &CompoundField, names: [&str; 2]| names.contains(&field.name.as_str());
@@ -209,11 +203,11 @@ fn parts(datatype: &Datatype) -> Option<(usize, (Part, Option<Part>))> {
     let size = *size as usize;
     let part = |field: &CompoundField| {
         Part::of(&field.datatype, field.byte_offset as usize)
-            .filter(|part| part.offset + part.size <= size)
+            .filter(|part| part.offset + part.dtype.size <= size)
     };
     Some((size, (part(real)?, Some(part(imaginary)?))))
 }
 
 fn damaged(path: &Path, found: String) -> FileError {
-    FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED }
+    FileError::damaged(path, found, EXPECTED)
 }

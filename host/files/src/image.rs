@@ -21,6 +21,7 @@ use ::image::{
     ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, ImageReader,
     Limits, Luma, RgbImage,
 };
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Seek};
 use std::path::{Path, PathBuf};
@@ -140,11 +141,7 @@ fn decode<E: From<FileError>>(
 
     let damaged = |error: ImageError| match error {
         ImageError::Limits(_) => too_large(path, None),
-        error => FileError::Damaged {
-            path: path.to_owned(),
-            found: error.to_string(),
-            expected: EXPECTED,
-        },
+        error => FileError::damaged(path, error.to_string(), EXPECTED),
     };
     let mut reader = ImageReader::with_format(stream, format);
     let mut limits = Limits::default();
@@ -251,7 +248,11 @@ pub fn encode_grey(
 ) -> Vec<u8> {
     assert_eq!(width * height, values.len(), "values of a {width} x {height} picture");
     let levels: Vec<u8> = values.iter().map(|&value| to_level(value)).collect();
-    encode(&levels, (width as u32, height as u32), png::ColorType::Grayscale, provenance)
+    written((width as u32, height as u32), provenance, |encoder| {
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_compression(png::Compression::Fast);
+        Ok(levels.into())
+    })
 }
 
 /// The bytes of an 8-bit colour PNG with its provenance.
@@ -270,33 +271,23 @@ fn encode_colours(
     texts: &[(&str, String)],
     provenance: &Provenance,
 ) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let encoded = (|| {
-        let mut encoder = png::Encoder::new(&mut bytes, picture.width(), picture.height());
-        encoder.set_depth(png::BitDepth::Eight);
+    written((picture.width(), picture.height()), provenance, |encoder| {
         for (key, text) in texts {
             encoder.add_text_chunk((*key).to_owned(), text.clone())?;
         }
-        sign(&mut encoder, provenance)?;
-        let indexed = indexed(picture);
-        let pixels = match indexed {
+        match indexed(picture) {
             Some((palette, pixels)) => {
                 encoder.set_color(png::ColorType::Indexed);
                 encoder.set_palette(palette);
                 encoder.set_filter(png::Filter::NoFilter);
-                pixels
+                Ok(pixels.into())
             }
             None => {
                 encoder.set_color(png::ColorType::Rgb);
-                picture.as_raw().clone()
+                Ok(picture.as_raw().into())
             }
-        };
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&pixels)?;
-        writer.finish()
-    })();
-    encoded.expect("a picture of at least one pixel encodes into memory");
-    bytes
+        }
+    })
 }
 
 /// The colours of a picture, three bytes each, and the number of each pixel's colour; `None` for a
@@ -329,21 +320,20 @@ pub fn to_level(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-fn encode(
-    levels: &[u8],
+/// The bytes of an 8-bit PNG with its provenance, unless `set` sets another depth; `set` gives the pixels.
+fn written<'p>(
     (width, height): (u32, u32),
-    color: png::ColorType,
     provenance: &Provenance,
+    set: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>) -> Result<Cow<'p, [u8]>, png::EncodingError>,
 ) -> Vec<u8> {
     let mut bytes = Vec::new();
     let encoded = (|| {
         let mut encoder = png::Encoder::new(&mut bytes, width, height);
-        encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::Fast);
+        let pixels = set(&mut encoder)?;
         sign(&mut encoder, provenance)?;
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(levels)?;
+        writer.write_image_data(&pixels)?;
         writer.finish()
     })();
     encoded.expect("a picture of at least one pixel encodes into memory");
@@ -356,18 +346,11 @@ fn encode(
 /// If there are not as many bytes as the picture has.
 #[must_use]
 pub fn encode_bits(side: u32, bits: &[u8], provenance: &Provenance) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let encoded = (|| {
-        let mut encoder = png::Encoder::new(&mut bytes, side, side);
+    written((side, side), provenance, |encoder| {
         encoder.set_color(png::ColorType::Grayscale);
         encoder.set_depth(png::BitDepth::One);
-        sign(&mut encoder, provenance)?;
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(bits)?;
-        writer.finish()
-    })();
-    encoded.expect("a picture of as many bits as it has pixels encodes into memory");
-    bytes
+        Ok(bits.into())
+    })
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@
 //! for all of them together.
 
 use super::FileError;
-use super::array::{MAX_AXES, has_shape, within_memory};
+use super::array::{Dtype, Kind, MAX_AXES, has_shape, within_memory};
 use super::field::Field;
 use flate2::bufread::ZlibDecoder;
 use std::borrow::Cow;
@@ -293,31 +293,20 @@ impl Mat {
     }
 
     fn numbers(&self, element: &Element<'_>) -> Option<Vec<f64>> {
-        let data = element.data;
-        Some(match element.kind {
-            1 => self.each(data, |b| f64::from(i8::from_le_bytes(b))),
-            2 => self.each(data, |b| f64::from(u8::from_le_bytes(b))),
-            3 => self.each(data, |b| f64::from(i16::from_le_bytes(b))),
-            4 => self.each(data, |b| f64::from(u16::from_le_bytes(b))),
-            5 => self.each(data, |b| f64::from(i32::from_le_bytes(b))),
-            6 => self.each(data, |b| f64::from(u32::from_le_bytes(b))),
-            7 => self.each(data, |b| f64::from(f32::from_le_bytes(b))),
-            9 => self.each(data, f64::from_le_bytes),
-            12 => self.each(data, |b| i64::from_le_bytes(b) as f64),
-            13 => self.each(data, |b| u64::from_le_bytes(b) as f64),
+        let (kind, size) = match element.kind {
+            1 => (Kind::Signed, 1),
+            2 => (Kind::Unsigned, 1),
+            3 => (Kind::Signed, 2),
+            4 => (Kind::Unsigned, 2),
+            5 => (Kind::Signed, 4),
+            6 => (Kind::Unsigned, 4),
+            7 => (Kind::Float, 4),
+            9 => (Kind::Float, 8),
+            12 => (Kind::Signed, 8),
+            13 => (Kind::Unsigned, 8),
             _ => return None,
-        })
-    }
-
-    fn each<const N: usize>(&self, data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-        let (elements, _) = data.as_chunks::<N>();
-        let in_order = |&(mut element): &[u8; N]| {
-            if self.is_big_endian {
-                element.reverse();
-            }
-            number(element)
         };
-        elements.iter().map(in_order).collect()
+        Some(Dtype { kind, size, big_endian: self.is_big_endian }.decode(element.data))
     }
 
     fn word(&self, bytes: &[u8]) -> u32 {
@@ -326,6 +315,6 @@ impl Mat {
     }
 
     fn damaged(&self, found: String) -> FileError {
-        FileError::Damaged { path: self.path.clone(), found, expected: EXPECTED }
+        FileError::damaged(&self.path, found, EXPECTED)
     }
 }

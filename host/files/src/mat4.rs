@@ -4,7 +4,7 @@
 //! the name, and the numbers column by column.
 
 use super::FileError;
-use super::array::{has_shape, within_memory};
+use super::array::{Dtype, Kind, has_shape, within_memory};
 use super::field::Field;
 use std::path::{Path, PathBuf};
 
@@ -21,20 +21,22 @@ pub(super) struct Mat4 {
 struct Variable {
     name: String,
     shape: [u64; 2],
-    kind: Kind,
+    dtype: Dtype,
     is_complex: bool,
     is_numbers: bool,
     /// Start of the numbers.
     start: usize,
 }
 
-/// How a number is stored.
-#[derive(Clone, Copy)]
-struct Kind {
-    is_big_endian: bool,
-    /// MathWorks' digit P.
-    precision: u32,
-}
+/// Types of numbers, by MathWorks' digit P.
+const KINDS: [(Kind, usize); 6] = [
+    (Kind::Float, 8),
+    (Kind::Float, 4),
+    (Kind::Signed, 4),
+    (Kind::Signed, 2),
+    (Kind::Unsigned, 2),
+    (Kind::Unsigned, 1),
+];
 
 impl Mat4 {
     pub(super) fn open(path: &Path, bytes: Vec<u8>) -> Result<Self, FileError> {
@@ -73,15 +75,15 @@ impl Mat4 {
         let name = self.bytes.get(start + HEADER_BYTES..)?.get(..name_bytes)?;
         let name = name.strip_suffix(b"\0")?;
         let shape = [u64::from(word(1)), u64::from(word(2))];
-        let kind_of_numbers = Kind { is_big_endian, precision };
+        let (number, size) = KINDS[precision as usize];
         let count = usize::try_from(shape[0].checked_mul(shape[1])?).ok()?;
-        let bytes = count.checked_mul(kind_of_numbers.size())?.checked_mul(1 + complex as usize)?;
+        let bytes = count.checked_mul(size)?.checked_mul(1 + complex as usize)?;
         let start = start + HEADER_BYTES + name_bytes;
         let end = start.checked_add(bytes).filter(|&end| end <= self.bytes.len())?;
         let variable = Variable {
             name: String::from_utf8_lossy(name).into_owned(),
             shape,
-            kind: kind_of_numbers,
+            dtype: Dtype { kind: number, size, big_endian: is_big_endian },
             is_complex: complex == 1,
             is_numbers: kind == 0,
             start,
@@ -97,7 +99,7 @@ impl Mat4 {
         let refuse =
             |found: String, expected: &str| FileError::field(&self.path, field, found, expected);
         let variable = self.variables.iter().find(|variable| variable.name == field);
-        let Some(Variable { shape, kind, is_complex, is_numbers, start, .. }) = variable else {
+        let Some(Variable { shape, dtype, is_complex, is_numbers, start, .. }) = variable else {
             return Err(refuse("is not there".to_owned(), "a variable of the file"));
         };
         if !is_numbers {
@@ -109,37 +111,15 @@ impl Mat4 {
         let axes = shape.map(|axis| axis as usize);
         let count = axes[0] * axes[1];
         let part = |part: usize| -> Vec<f64> {
-            let bytes = &self.bytes[start + part * count * kind.size()..][..count * kind.size()];
-            bytes.chunks_exact(kind.size().max(1)).map(|bytes| kind.number(bytes)).collect()
+            let bytes = count * dtype.size;
+            dtype.decode(&self.bytes[start + part * bytes..][..bytes])
         };
         let imaginary = is_complex.then(|| part(1));
         Ok(Field::from_column_major(axes.to_vec(), &part(0), imaginary.as_deref()))
     }
 
     fn damaged(&self, found: String) -> FileError {
-        FileError::Damaged { path: self.path.clone(), found, expected: EXPECTED }
-    }
-}
-
-impl Kind {
-    /// Bytes of a number.
-    fn size(self) -> usize {
-        [8, 4, 4, 2, 2, 1][self.precision as usize]
-    }
-
-    fn number(self, bytes: &[u8]) -> f64 {
-        let mut word = [0; 8];
-        for (at, &byte) in bytes.iter().enumerate() {
-            word[if self.is_big_endian { bytes.len() - 1 - at } else { at }] = byte;
-        }
-        let word = u64::from_le_bytes(word);
-        match self.precision {
-            0 => f64::from_bits(word),
-            1 => f64::from(f32::from_bits(word as u32)),
-            2 => f64::from(word as u32 as i32),
-            3 => f64::from(word as u16 as i16),
-            _ => word as f64,
-        }
+        FileError::damaged(&self.path, found, EXPECTED)
     }
 }
 

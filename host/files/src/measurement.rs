@@ -187,7 +187,9 @@ pub fn read(path: &Path, want: &Selection) -> Result<MeasurementFile, FileError>
 pub(crate) fn read_fields(fields: Fields, want: &Selection) -> Result<MeasurementFile, FileError> {
     let path = fields.path().to_owned();
     let mut file = Opened::of(fields, want)?;
-    let index = file.readings.layout.choose(&path, &file.readings.name, want.index)?;
+    let layout = file.readings.layout;
+    let is_square = file.side_guessed && layout.count == file.patterns();
+    let index = layout.choose(&path, &file.readings.name, want.index, is_square)?;
     file.loaded()?.measurement(index)
 }
 

@@ -8,9 +8,9 @@
 use super::FileError;
 use super::array::{ArrayError, Header, MAGIC, MAX_AXES, NUMBERS, Sample, Take, shape_text};
 use super::field::Field;
-use super::plain::{kind_by_start, open_file};
+use super::plain::{kind_by_start, open_start};
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 const EXPECTED: &str = "a NumPy array (.npy) of images, (N, H, W) or (H, W)";
@@ -71,12 +71,7 @@ pub struct Pictures {
 }
 
 fn refuse(path: &Path, found: String, expected: &str) -> FileError {
-    FileError::Field {
-        path: path.to_owned(),
-        field: FIELD.into(),
-        found,
-        expected: expected.to_owned(),
-    }
+    FileError::field(path, FIELD, found, expected)
 }
 
 fn finite(path: &Path, stack: Stack) -> Result<Stack, FileError> {
@@ -163,20 +158,13 @@ fn read_array<D>(
     shapes: &str,
     decode: impl FnOnce(&Header, &mut BufReader<File>, u64) -> Result<D, ArrayError>,
 ) -> Result<(Header, D), FileError> {
-    let (file, file_bytes) = open_file(path, expected)?;
+    let (file, file_bytes, start) = open_start(path, expected, MAGIC.len())?;
     let mut stream = BufReader::new(file);
-    let mut start = Vec::new();
-    stream
-        .by_ref()
-        .take(MAGIC.len() as u64)
-        .read_to_end(&mut start)
-        .and_then(|_| stream.rewind())
-        .map_err(|error| FileError::io(path, "read", error))?;
     if !MAGIC.starts_with(&start) {
         return Err(FileError::kind(path, kind_by_start(&start), expected));
     }
 
-    let damaged = |found| FileError::Damaged { path: path.to_owned(), found, expected };
+    let damaged = |found| FileError::damaged(path, found, expected);
     let explain = |error| match error {
         ArrayError::Damaged(found) => damaged(found),
         ArrayError::Dtype(found) => refuse(path, found, NUMBERS),

@@ -4,7 +4,7 @@ use super::FileError;
 #[cfg(not(target_family = "wasm"))]
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek};
 use std::path::Path;
 
 /// The first bytes of a NumPy array.
@@ -29,6 +29,20 @@ pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u6
         return Err(FileError::kind(path, "an empty file", expected));
     }
     Ok((File::open(path).map_err(read)?, metadata.len()))
+}
+
+/// Opens a plain file and reads its first bytes; it is then at its first byte again. Every error names the path.
+pub(super) fn open_start(
+    path: &Path,
+    expected: &'static str,
+    most: usize,
+) -> Result<(File, u64, Vec<u8>), FileError> {
+    let (mut file, length) = open_file(path, expected)?;
+    let mut start = Vec::new();
+    let read = file.by_ref().take(most as u64).read_to_end(&mut start);
+    let read = read.and_then(|_| file.rewind());
+    read.map_err(|error| FileError::io(path, "read", error))?;
+    Ok((file, length, start))
 }
 
 /// Largest text file of numbers that is read: a table of 100 000 rows of four numbers is 4 MB.

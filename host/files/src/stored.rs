@@ -182,5 +182,5 @@ fn all_finite(values: &[f64]) -> bool {
 }
 
 pub(super) fn damaged(path: &Path, found: String) -> FileError {
-    FileError::Damaged { path: path.to_owned(), found, expected: EXPECTED }
+    FileError::damaged(path, found, EXPECTED)
 }

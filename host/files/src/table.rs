@@ -68,8 +68,7 @@ impl Table {
     }
 
     fn wrong(&self, line: usize, found: &str, expected: String) -> FileError {
-        let (path, found) = (self.path.clone(), format!("has {found} in line {line}"));
-        FileError::Field { path, field: "table".into(), found, expected }
+        FileError::field(&self.path, "table", format!("has {found} in line {line}"), expected)
     }
 }
 

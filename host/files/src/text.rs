@@ -66,7 +66,7 @@ pub(super) fn read(path: &Path, decimal_comma: bool) -> Result<Text, FileError> 
 fn read_str(path: &Path, text: String, decimal_comma: bool) -> Result<Text, FileError> {
     // Lines that end as on an old Macintosh.
     let text = if text.contains('\n') { text } else { text.replace('\r', "\n") };
-    let text = listed(&text).unwrap_or(text);
+    let text = listed(&text).or_else(|| labelled(&text)).unwrap_or(text);
     let lines = Lines::of(&text);
     let refused = match plain(path, &lines, decimal_comma) {
         Ok(numbers) => return Ok(Text::new(numbers, None)),
@@ -101,6 +101,28 @@ fn listed(text: &str) -> Option<String> {
         Some(row).filter(|row| !row.is_empty())
     };
     Some(inner.split(close).filter_map(row).collect::<Vec<String>>().join("\n"))
+}
+
+/// The table of lines such as `light:71,limit:90`, which the Arduino's plotter reads: the names become its heading.
+fn labelled(text: &str) -> Option<String> {
+    fn parted(line: &str) -> Option<(Vec<&str>, Vec<&str>)> {
+        let words = line.split([',', '\t', ' ']).filter(|word| !word.is_empty());
+        let is_labelled = |(name, number): &(&str, &str)| {
+            parse(name, '.').is_none() && !number.is_empty() && parse(number, '.').is_some()
+        };
+        words.map(|word| word.split_once(':').filter(is_labelled)).collect()
+    }
+    let mut lines = text.lines().filter(|line| !line.trim().is_empty()).map(parted);
+    let (names, first) = lines.next()??;
+    let mut rows = vec![names.join(","), first.join(",")];
+    for line in lines {
+        let (of, numbers) = line?;
+        if of != names {
+            return None;
+        }
+        rows.push(numbers.join(","));
+    }
+    (!names.is_empty()).then(|| rows.join("\n"))
 }
 
 impl Text {
@@ -223,18 +245,18 @@ fn plain(path: &Path, lines: &Lines<'_>, decimal_comma: bool) -> Result<Numbers,
         separators.split(heading).map(|name| name.trim_matches('"').to_owned()).collect()
     });
     Ok(match names.filter(|names| names.len() == width) {
-        Some(names) => Numbers::Columns(
-            names
-                .into_par_iter()
-                .enumerate()
-                .map(|(at, name)| {
-                    let real = real.iter().copied().skip(at).step_by(width).collect();
-                    (name, Field { shape: vec![height], real, imaginary: None })
-                })
-                .collect(),
-        ),
+        Some(names) => Numbers::Columns(names.into_iter().zip(columns_of(&real, width)).collect()),
         None => Numbers::Table(Field { shape: vec![height, width], real, imaginary: None }),
     })
+}
+
+/// The columns of a table with `width` numbers in each line.
+fn columns_of(numbers: &[f64], width: usize) -> Vec<Field> {
+    let column = |at| {
+        let real: Vec<f64> = numbers.iter().copied().skip(at).step_by(width).collect();
+        Field { shape: vec![real.len()], real, imaginary: None }
+    };
+    (0..width).into_par_iter().map(column).collect()
 }
 
 /// The numbers of these lines, `width` in each, one line after another. The error is that of the first line
@@ -310,9 +332,15 @@ impl Separators {
             return decimal(between, '.');
         }
         if has('.') {
-            return match between {
-                None => decimal(Some(','), '.'),
-                Some(_) => Err(FileError::field(
+            // A date has points, too.
+            let words = body.iter().take(1).flat_map(|(_, line)| Words::of(line, between, true));
+            let shows =
+                |mark| words.clone().any(|word| word.contains(mark) && parse(word, mark).is_some());
+            return match (between, shows('.'), shows(',')) {
+                (None, ..) => decimal(Some(','), '.'),
+                (_, true, false) => decimal(between, '.'),
+                (_, false, true) => decimal(between, ','),
+                _ => Err(FileError::field(
                     path,
                     "table",
                     "has points and commas in its numbers",

@@ -42,46 +42,37 @@ impl Raw {
     /// Every kind.
     pub const ALL: [Self; 4] = [Self::F32, Self::F64, Self::I16, Self::I32];
 
+    /// The word for the kind, the kind in a few words, the bytes of a number, and the type as NumPy writes it.
+    fn facts(self) -> (&'static str, &'static str, usize, &'static str) {
+        match self {
+            Self::F32 => ("f32", "32-bit floats", 4, "<f4"),
+            Self::F64 => ("f64", "64-bit floats", 8, "<f8"),
+            Self::I16 => ("i16", "signed 16-bit integers", 2, "<i2"),
+            Self::I32 => ("i32", "signed 32-bit integers", 4, "<i4"),
+        }
+    }
+
     /// The word for the kind.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::F32 => "f32",
-            Self::F64 => "f64",
-            Self::I16 => "i16",
-            Self::I32 => "i32",
-        }
+        self.facts().0
     }
 
     /// The kind in a few words.
     #[must_use]
     pub fn about(self) -> &'static str {
-        match self {
-            Self::F32 => "32-bit floats",
-            Self::F64 => "64-bit floats",
-            Self::I16 => "signed 16-bit integers",
-            Self::I32 => "signed 32-bit integers",
-        }
+        self.facts().1
     }
 
     /// Bytes of a number.
     #[must_use]
     pub fn bytes(self) -> usize {
-        match self {
-            Self::I16 => 2,
-            Self::F32 | Self::I32 => 4,
-            Self::F64 => 8,
-        }
+        self.facts().2
     }
 
     /// The type as NumPy writes it.
     pub(super) fn descr(self) -> &'static str {
-        match self {
-            Self::F32 => "<f4",
-            Self::F64 => "<f8",
-            Self::I16 => "<i2",
-            Self::I32 => "<i4",
-        }
+        self.facts().3
     }
 
     /// The number in these bytes, as many as a number of this kind has.

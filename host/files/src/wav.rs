@@ -44,21 +44,17 @@ pub(super) fn read(path: &Path) -> Result<Vec<Field>, FileError> {
     let each = count.min(length) as usize / channels;
     let mut columns: Vec<Vec<f64>> = (0..channels).map(|_| Vec::with_capacity(each)).collect();
     let mut places = (0..channels).cycle();
-    let mut add = |sample: f64| {
-        if let Some(at) = places.next() {
-            columns[at].push(sample);
-        }
+    let mut add = |sample: Result<f64, Error>| {
+        let sample = sample.map_err(refused)?;
+        places.next().into_iter().for_each(|at| columns[at].push(sample));
+        Ok(())
     };
     match spec.sample_format {
         SampleFormat::Int => {
-            for sample in reader.samples::<i32>() {
-                add(sample.map_err(refused)?.into());
-            }
+            reader.samples::<i32>().try_for_each(|sample| add(sample.map(f64::from)))?;
         }
         SampleFormat::Float => {
-            for sample in reader.samples::<f32>() {
-                add(sample.map_err(refused)?.into());
-            }
+            reader.samples::<f32>().try_for_each(|sample| add(sample.map(f64::from)))?;
         }
     }
     let field = |real: Vec<f64>| Field { shape: vec![real.len()], real, imaginary: None };

@@ -8,14 +8,18 @@
 //! | [`Rows`] | checked numbers of Hadamard rows |
 //! | [`order`] | the order in which patterns are shown |
 //! | [`fwht`](mod@fwht) | an image's Hadamard measurements, and back |
+//! | [`fourier`] | cosines of each frequency, and the spectrum that they give |
+//! | [`s_matrix`] | cyclic S-matrices |
 //! | [`basis`] | an image's coefficients, most of them nearly zero |
 //! | [`Sampling`] | `0.3`, `30%` or `30`: a checked share of the patterns |
 
 pub mod basis;
+pub mod fourier;
 pub mod fwht;
 mod image;
 pub mod order;
 mod rows;
+pub mod s_matrix;
 mod sampling;
 mod side;
 mod size;

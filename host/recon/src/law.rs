@@ -16,6 +16,7 @@
 
 mod doubt;
 mod dropout;
+mod ends;
 mod form;
 mod lamp;
 mod outlier;
@@ -76,6 +77,38 @@ pub struct Reading {
     pub lamp: Option<Lamp>,
 }
 
+impl Reading {
+    /// Measurements without drop-outs, dark level and lamp.
+    fn of(measurements: Measurements, outliers: Vec<Outlier>, doubts: Vec<Doubt>) -> Self {
+        let (dropouts, dark_level, lamp) = (Vec::new(), None, None);
+        Self { measurements, dropouts, outliers, doubts, dark_level, lamp }
+    }
+}
+
+/// Where patterns are in a recording of which some were not read.
+#[derive(Debug, Clone, Copy)]
+pub struct Places<'p> {
+    /// The place of each pattern that was read, in the order shown.
+    pub read: &'p [usize],
+    /// Number of patterns, those that were not read included.
+    pub patterns: usize,
+}
+
+impl Places<'_> {
+    /// The place of a pattern that was read.
+    fn of(places: Option<Places<'_>>, pattern: usize) -> usize {
+        places.map_or(pattern, |places| places.read[pattern])
+    }
+
+    /// Values for every place, to look for the order of the recording: a pattern that was not read has those of the
+    /// pattern before.
+    fn filled<T: Copy>(places: Option<Places<'_>>, values: &[T]) -> Vec<T> {
+        let Some(Places { read, patterns }) = places else { return values.to_vec() };
+        let before = |place| read.partition_point(|&read| read <= place).saturating_sub(1);
+        (0..patterns).map(|place| values[before(place)]).collect()
+    }
+}
+
 /// Measurements from finite readings of `rows`, in the order in which the patterns were shown. Pairs
 /// are `[+, -, +, -, ...]`, also those of [`Form::Halves`], which says how the recording had them.
 ///
@@ -83,6 +116,19 @@ pub struct Reading {
 /// [`MeasurementError`] if there are not as many readings as the form has for these rows, or a reading
 /// is not finite; [`Empty`](MeasurementError::Empty) if no pattern is left.
 pub fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, MeasurementError> {
+    read_at(rows, y, claim, None)
+}
+
+/// As [`read`], of the patterns at these places of a recording.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_at(
+    rows: &Rows,
+    y: &[f64],
+    claim: Claim,
+    places: Option<Places<'_>>,
+) -> Result<Reading, MeasurementError> {
     let field = if claim.form == Form::Differences { "d" } else { "y" };
     expect_length(field, y.len(), rows.len() * claim.form.readings())?;
     expect_finite(field, y)?;
@@ -92,20 +138,12 @@ pub fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, Measurement
             Form::Single => Measurements::from_single(rows, y)?,
             Form::Differences => Measurements::from_differential(rows, y)?,
         };
-        let (dropouts, outliers) = (Vec::new(), Vec::new());
-        return Ok(Reading {
-            measurements,
-            dropouts,
-            outliers,
-            doubts: vec![doubt],
-            dark_level: None,
-            lamp: None,
-        });
+        return Ok(Reading::of(measurements, Vec::new(), vec![doubt]));
     }
     match claim.form {
-        Form::Pairs | Form::Halves => pairs::read(rows, y, claim),
-        Form::Single => signed::read_single(rows, y, claim),
-        Form::Differences => signed::read_differences(rows, y, claim),
+        Form::Pairs | Form::Halves => pairs::read(rows, y, claim, places),
+        Form::Single => signed::read_single(rows, y, claim, places),
+        Form::Differences => signed::read_differences(rows, y, claim, places),
     }
 }
 

@@ -37,7 +37,7 @@ pub use measurements::{MeasurementError, Measurements, ShorterSweep};
 pub use nirspi_omp::{self as omp, Backend, ParseBackendError, backend};
 pub use nirspi_patterns::{
     Basis, FwhtLengthError, Image, NamedOrder, Order, ParseBasisError, ParseOrderError, Rows,
-    RowsError, Sampling, SamplingError, Shape, Side, SideError, Size, SizeError, basis, fwht,
-    order,
+    RowsError, Sampling, SamplingError, Shape, Side, SideError, Size, SizeError, basis, fourier,
+    fwht, order, s_matrix,
 };
 pub use repeats::Repeats;

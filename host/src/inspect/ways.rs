@@ -189,7 +189,30 @@ impl<'t> Trials<'t> {
             read => read,
         };
         let file = file.ok()?;
+        if trace.is_none() && self.is_no_spectrum(&want, &file) {
+            return None;
+        }
         (file.h_row.len() >= LEAST).then_some((want, file))
+    }
+
+    /// Whether readings on two axes are no spectrum: in an image, other pixels are brighter than that of the all-on
+    /// pattern would be.
+    fn is_no_spectrum(&self, want: &Selection, file: &MeasurementFile) -> bool {
+        let is_flat = |array: &Array| array.axes().len() <= 1;
+        if want.shown.is_none() || want.index.is_some() || self.array(want).is_none_or(is_flat) {
+            return false;
+        }
+        let readings = file.readings.values();
+        let each = readings.len() / file.h_row.len();
+        let all_on = file.h_row.iter().position(|&row| row == 0).map(|at| readings[each * at]);
+        all_on.is_none_or(|all_on| readings.iter().any(|reading| reading.abs() > all_on.abs()))
+    }
+
+    /// The array of the readings.
+    fn array(&self, want: &Selection) -> Option<&Array> {
+        let field = want.field.as_deref().unwrap_or("y").split(',').next();
+        let arrays = self.contents.arrays();
+        arrays.iter().find(|array| Some(&*array.name) == field).or(arrays.first())
     }
 
     /// Leaves out orders under which these readings have the same patterns as under one before, or the
@@ -296,10 +319,7 @@ impl<'t> Trials<'t> {
             None => {
                 let form = base.form.unwrap_or(self.default_form(base));
                 let of = |array: &Array| array.axes().last().copied().unwrap_or(0);
-                let field = base.field.as_deref().unwrap_or("y");
-                let field = field.split(',').next().unwrap_or(field);
-                let array = holds(field).or(self.contents.arrays().first());
-                array.map_or(0, of) / form.readings() + 1
+                self.array(base).map_or(0, of) / form.readings() + 1
             }
         };
         let fits = |side: &Side| side.area() >= least;
@@ -411,22 +431,31 @@ fn bases(contents: &Contents) -> Vec<Selection> {
         };
         let has_axes = own.is_some_and(|array| array.axes().len() > 1);
         let default = default_form(arrays, field.as_deref());
+        let way = |form: Form, patterns_first, side| Selection {
+            field: field.clone(),
+            form: (form != default).then_some(form),
+            patterns_first,
+            side,
+            decimal_comma: contents.decimal_comma(),
+            ..Selection::default()
+        };
         for patterns_first in [false, true].into_iter().take(1 + usize::from(has_axes)) {
-            found.extend(Form::ALL.map(|form| Selection {
-                field: field.clone(),
-                form: (form != default).then_some(form),
-                patterns_first,
-                decimal_comma: contents.decimal_comma(),
-                ..Selection::default()
-            }));
+            found.extend(Form::ALL.map(|form| way(form, patterns_first, None)));
         }
+        let side = own.and_then(side_of_spectrum).filter(|_| !holds("n") && !holds("h_row"));
+        found.extend(
+            side.into_iter().flat_map(|side| Form::ALL.map(|form| way(form, false, Some(side)))),
+        );
     }
     with_rows(arrays, &found).into_iter().chain(found.clone()).collect()
 }
 
 /// The same ways with rows that the file does not call `h_row`.
 fn with_rows(arrays: &[Array], ways: &[Selection]) -> Vec<Selection> {
-    let is_rows = |array: &&Array| array.numbers.as_ref().is_some_and(|look| look.is_rows);
+    // What counts the lines of a table is no list of rows: it would be natural order.
+    let is_rows = |array: &&Array| {
+        array.numbers.as_ref().is_some_and(|look| look.is_rows && !look.is_counter)
+    };
     let named = |array: &&Array| !array.name.is_empty() && !NO_READINGS.contains(&&*array.name);
     let (None, Some(rows)) = (array_of(arrays, "h_row"), arrays.iter().filter(named).find(is_rows))
     else {
@@ -448,6 +477,14 @@ fn with_rows(arrays: &[Array], ways: &[Selection]) -> Vec<Selection> {
         }
     };
     others.map(with).collect()
+}
+
+/// The side of the image whose spectrum an array may be, perhaps with pattern and complement on its last axis.
+fn side_of_spectrum(array: &Array) -> Option<Side> {
+    match *array.axes() {
+        [height, width] | [height, width, 2] if height == width => Side::new(width as u64).ok(),
+        _ => None,
+    }
 }
 
 /// Whether a way names the rows of the patterns.

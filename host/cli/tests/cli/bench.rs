@@ -323,6 +323,15 @@ impl Measured {
         Self { n, image, h_row: rows.iter().map(|&row| row as f32).collect(), d, y }
     }
 
+    /// The readings in the natural order of the rows.
+    pub fn natural(&self) -> Vec<f32> {
+        let mut y = vec![0.0; self.y.len()];
+        for (pair, &row) in self.y.as_chunks::<2>().0.iter().zip(&self.h_row) {
+            y[2 * row as usize..][..2].copy_from_slice(pair);
+        }
+        y
+    }
+
     /// Its file, with the field `name` replaced, or left out where `with` is nothing.
     pub fn npz_with(&self, name: &str, with: Option<(&[usize], &[f32])>) -> Vec<u8> {
         let (rows, n) = ([self.h_row.len()], [self.n as f32]);

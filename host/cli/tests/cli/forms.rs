@@ -45,8 +45,7 @@ fn forms(measured: &Measured) -> Vec<Form> {
     let at = |row: usize| measured.h_row.iter().position(|&shown| shown == row as f32).unwrap();
     let rows: Vec<f32> = (0..area).map(|row| row as f32).collect();
     let d: Vec<f32> = (0..area).map(|row| measured.d[at(row)]).collect();
-    let y: Vec<f32> =
-        (0..area).flat_map(|row| [measured.y[2 * at(row)], measured.y[2 * at(row) + 1]]).collect();
+    let y = measured.natural();
     let side = |which: usize| y.iter().copied().skip(which).step_by(2).collect::<Vec<f32>>();
     let (on, off) = (side(0), side(1));
     let whole: (&str, &[usize], &[f32]) = ("n", &[], &[n as f32]);

@@ -1,11 +1,11 @@
 //! What a file holds, and the command that reconstructs it.
 
 use crate::bench::{Bench, Measured, correlation, npz};
+use crate::cases::cases;
 use nirspi::files::npy::{encode, read_stack};
 use nirspi_recon::{Order, Side};
 use std::fmt::Write as _;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The words of a command, as a shell reads them.
 fn shell(command: &str) -> Vec<String> {
@@ -49,10 +49,7 @@ struct Natural {
 impl Natural {
     fn new() -> Self {
         let measured = Measured::new(16);
-        let mut y = vec![0.0; 512];
-        for (k, &row) in measured.h_row.iter().enumerate() {
-            y[2 * row as usize..][..2].copy_from_slice(&measured.y[2 * k..2 * k + 2]);
-        }
+        let y = measured.natural();
         let half = |which: usize| y.iter().copied().skip(which).step_by(2).collect();
         let (on, off) = (half(0), half(1));
         Self { measured, y, on, off }
@@ -91,6 +88,8 @@ fn the_first_command_gives_the_image() {
         ("single.npy", encode(&[256], &scene.on), "single", "natural"),
         ("dark.npy", encode(&[256], &scene.off), "single, inverted", "natural"),
         ("d.npy", encode(&[256], &scene.d()), "differences", "natural"),
+        ("spectrum.npy", encode(&[16, 16], &scene.d()), "differences", "natural"),
+        ("spectrum of pairs.npy", encode(&[16, 16, 2], y), "pairs", "natural"),
         ("zig-zag.npy", encode(&n, &shown), "pairs", "zig-zag"),
         ("part.npy", encode(&[150], &part), "single", "zig-zag"),
         ("first.npy", encode(&n, &exchanged), "pairs, complements first", "natural"),
@@ -301,17 +300,6 @@ fn what_is_no_file_of_readings_is_one_line() {
         (&report["arrays"][0]["missing"], &report["guesses"][0]["patterns"]),
         (&1.into(), &255.into())
     );
-}
-
-/// Inputs of the benches of others, beside the shared data; they are not part of this repository.
-fn cases() -> Option<PathBuf> {
-    let data = std::env::var_os("NIRSPI_DATA").map(PathBuf::from);
-    let folder = data.map(|data| data.join("../cases/readings")).filter(|folder| folder.is_dir());
-    if folder.is_none() {
-        let _ =
-            writeln!(std::io::stderr(), "skipped: no inputs (../cases/readings of NIRSPI_DATA)");
-    }
-    folder
 }
 
 #[test]

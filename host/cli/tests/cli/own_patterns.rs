@@ -253,6 +253,77 @@ fn patterns_come_in_any_size_and_form() {
     assert!(correlation(&bench.pixels("out/image.npy"), &scene) > 0.9);
 }
 
+/// Fewer patterns than pixels of sides that have no Hadamard matrix, and more patterns than pixels; 0 and 1, and grey.
+#[test]
+fn benches_with_other_patterns_get_their_images() {
+    let bench = Bench::new();
+    for (height, width, share, levels) in
+        [(12, 15, 0.6, 1), (10, 10, 0.6, 1), (28, 28, 0.6, 1), (12, 15, 4.0, 1), (16, 16, 4.0, 255)]
+    {
+        let count = (share * (height * width) as f64) as usize;
+        let (scene, mut weights, mut y) = of_size(height, width, count);
+        if levels > 1 {
+            let grey = |at: usize| ((at * at * 31 + at * 17) % 253 % (levels + 1)) as f32 / 255.0;
+            weights = (0..weights.len()).map(|at| 0.5 * weights[at] + 0.5 * grey(at)).collect();
+            let see = |p: &[f32]| p.iter().zip(&scene).map(|(w, v)| w * v).sum::<f32>();
+            y = weights.chunks_exact(height * width).map(see).collect();
+        }
+        let text: String = y.iter().map(|y| format!("np.float64({y})\n")).collect();
+        bench.write("y.txt", text.as_bytes());
+        bench.write("phi.npy", &npy::encode(&[count, height, width], &weights));
+        let line = ["reconstruct", "y.txt", "--matrix", "phi.npy", "--method", "tv"];
+        bench.run(&line).succeeded();
+        let alike = correlation(&bench.pixels("out/image.npy"), &scene);
+        assert!(alike > 0.95, "{height} x {width}, {count} patterns: {alike}");
+    }
+    // The cyclic S-matrix of a bench of 255 pixels, by its name.
+    let order = ["order", "s-matrix:255", "--out", "set"];
+    bench.run(&order).succeeded();
+    let (scene, ..) = of_size(15, 17, 1);
+    let patterns = bench.pixels("set/patterns.npy");
+    let see = |p: &[f32]| p.iter().zip(&scene).map(|(w, v)| w * v).sum::<f32>() + 7.0;
+    let y: Vec<f32> = patterns.chunks_exact(255).map(see).collect();
+    bench.write("y.npy", &npy::encode(&[255], &y));
+    let line = ["reconstruct", "y.npy", "--matrix", "s-matrix:255", "--size", "15x17"];
+    bench.run(&[&line[..], &["--method", "tikhonov"]].concat()).succeeded();
+    let alike = correlation(&bench.pixels("out/image.npy"), &scene);
+    assert!(alike > 0.99, "{alike}");
+}
+
+/// An array of two axes as `save -v4` of MATLAB writes it.
+fn level_4(name: &str, height: usize, width: usize, rows: &[f32]) -> Vec<u8> {
+    let words = [0, height as u32, width as u32, 0, name.len() as u32 + 1];
+    let mut bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    bytes.extend(name.bytes().chain([0]));
+    let down = (0..height * width).map(|at| rows[at % height * width + at / height]);
+    bytes.extend(down.flat_map(|weight| f64::from(weight).to_le_bytes()));
+    bytes
+}
+
+#[test]
+fn patterns_and_readings_come_in_one_file_of_matlab() {
+    let bench = Bench::new();
+    let (scene, weights, y) = of_size(12, 15, 160);
+    let both = [level_4("phi", 160, 180, &weights), level_4("volts", 160, 1, &y)].concat();
+    bench.write("both.mat", &both);
+    let line = ["reconstruct", "both.mat", "--matrix", "both.mat", "--size", "12x15"];
+    bench.run(&[&line[..], &["--field", "volts"]].concat()).succeeded();
+    let alike = correlation(&bench.pixels("out/image.npy"), &scene);
+    assert!(alike > 0.95, "{alike}");
+    bench
+        .run(&[&line[..], &["--field", "volts", "--matrix-field", "psi"]].concat())
+        .failed(1, &["`psi` is not in the file, expected --matrix-field with one of phi, volts"]);
+    // A refusal says what a file holds, by the paths of its structures and groups.
+    for (name, paths) in [
+        ("nested.mat", "`run.n`, `run.adc.text`, `run.adc.y`, `run.h_row`"),
+        ("nested.h5", "`run/"),
+    ] {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../files/src/small/");
+        bench.write(name, &std::fs::read(format!("{folder}{name}")).unwrap());
+        bench.run(&["reconstruct", name, "--shown", "natural"]).failed(1, &[name, paths]);
+    }
+}
+
 /// All measurements of a file in one step: each image is the one that its measurement alone gives.
 #[test]
 fn all_measurements_of_a_file_become_one_stack() {

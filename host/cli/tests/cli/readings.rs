@@ -6,11 +6,7 @@ use nirspi::files::npy;
 /// The readings of the phantom, 16 x 16, natural order, as an array alone.
 fn phantom(bench: &Bench, change: impl Fn(Vec<f32>) -> Vec<f32>) -> Measured {
     let measured = Measured::new(16);
-    let mut y = vec![0.0; 512];
-    for (k, &row) in measured.h_row.iter().enumerate() {
-        y[2 * row as usize..][..2].copy_from_slice(&measured.y[2 * k..2 * k + 2]);
-    }
-    let y = change(y);
+    let y = change(measured.natural());
     bench.write("in.npy", &npy::encode(&[y.len()], &y));
     measured
 }
@@ -21,6 +17,12 @@ fn said(bench: &Bench, more: &[&str]) -> (String, serde_json::Value) {
     let outcome = bench.run(&all);
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     (outcome.stdout + &outcome.stderr, bench.json("out/report.json"))
+}
+
+/// Several samples of each reading, with noise, which hardly changes from sample to sample.
+fn samples(each: usize, y: &[f32]) -> Vec<f32> {
+    let noise = |k: usize, at: usize| ((k * k * 31 + k * 7) % 97 + at % 2) as f32 / 200.0;
+    (0..each * y.len()).map(|at| y[at / each] + noise(at / each, at)).collect()
 }
 
 #[test]
@@ -40,10 +42,12 @@ fn right_readings_get_no_warning() {
 fn readings_of_another_form_get_a_warning_that_names_the_form() {
     let bench = Bench::new();
     type Change = fn(Vec<f32>) -> Vec<f32>;
-    let cases: [(&str, Change, &[&str]); 5] = [
+    let halves: Change =
+        |y| y.iter().step_by(2).chain(y.iter().skip(1).step_by(2)).copied().collect();
+    let cases: [(&str, Change, &[&str]); 8] = [
         (
             "halves",
-            |y| y.iter().step_by(2).chain(y.iter().skip(1).step_by(2)).copied().collect(),
+            halves,
             &["512 readings: ", "below the all-off reading", "try --readings halves"],
         ),
         (
@@ -54,6 +58,16 @@ fn readings_of_another_form_get_a_warning_that_names_the_form() {
         ("inverted", |y| y.iter().map(|y| -y).collect(), &["inverting amplifier"]),
         ("early", |y| [&y[1..], &y[..1]].concat(), &["one reading early"]),
         ("late", |y| [&y[..1], &y[..511]].concat(), &["one reading late"]),
+        ("4", |y| samples(4, &y), &["4 samples of each reading"]),
+        ("16", |y| samples(16, &y), &["16 samples of each reading"]),
+        (
+            "halves of which one was not read",
+            |y| {
+                let at = |k: usize| if k == 100 { f32::NAN } else { y[k % 256 * 2 + k / 256] };
+                (0..512).map(at).collect()
+            },
+            &["try --readings halves"],
+        ),
     ];
     for (name, change, words) in cases {
         phantom(&bench, change);
@@ -63,9 +77,41 @@ fn readings_of_another_form_get_a_warning_that_names_the_form() {
             assert!(warning.contains(word) && lines.contains("warning: "), "{name}: {lines}");
         }
     }
-    phantom(&bench, cases[0].1);
+    phantom(&bench, halves);
     let (lines, report) = said(&bench, &["--readings", "halves"]);
     assert!(report["warnings"].as_array().unwrap().is_empty(), "{lines}");
+    // Patterns that light the -1, without complements.
+    phantom(&bench, |y| y.iter().skip(1).step_by(2).copied().collect());
+    let (lines, _) = said(&bench, &["--readings", "single"]);
+    assert!(lines.contains("patterns that light the -1 instead of the +1"), "{lines}");
+}
+
+#[test]
+fn readings_without_the_first_one_are_shifted_by_an_option() {
+    let bench = Bench::new();
+    let measured = phantom(&bench, |y| y.iter().skip(2).step_by(2).copied().collect());
+    let single = ["--readings", "single", "--side", "16"];
+    let (lines, _) = said(&bench, &[&single[..], &["--shift", "1"]].concat());
+    assert!(lines.contains("not read: 1 pattern left out, at [0]"), "{lines}");
+    let alike = correlation(&bench.pixels("out/image.npy"), &measured.image);
+    assert!(alike > 0.99, "{alike}");
+}
+
+#[test]
+fn words_of_a_converter_for_no_reading_are_drop_outs() {
+    let bench = Bench::new();
+    for value in [-999.0, 0.0] {
+        let measured = phantom(&bench, |mut y| {
+            y[100..104].fill(value);
+            y[301] = value;
+            y
+        });
+        let (lines, report) = said(&bench, &[]);
+        assert!(lines.contains("drop-out: 4 readings from y[100] on, 2 patterns"), "{lines}");
+        assert_eq!(report["measurements"], 253, "{lines}");
+        let alike = correlation(&bench.pixels("out/image.npy"), &measured.image);
+        assert!(alike > 0.99, "{value}: {alike}");
+    }
 }
 
 #[test]

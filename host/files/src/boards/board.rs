@@ -109,19 +109,21 @@ impl Table {
         self.entries.iter().find(|(found, _)| *found == key).map(|(_, value)| *value)
     }
 
+    fn value(&self, key: &str) -> Result<Value, String> {
+        self.find(key).ok_or_else(|| self.error(format_args!("missing key {key}")))
+    }
+
     fn text(&self, key: &str) -> Result<&'static str, String> {
-        match self.find(key) {
-            Some(Value::Text(text)) => Ok(text),
-            Some(Value::Number(_)) => Err(self.error(format_args!("{key} must be a \"text\""))),
-            None => Err(self.error(format_args!("missing key {key}"))),
+        match self.value(key)? {
+            Value::Text(text) => Ok(text),
+            Value::Number(_) => Err(self.error(format_args!("{key} must be a \"text\""))),
         }
     }
 
     fn number(&self, key: &str) -> Result<u64, String> {
-        match self.find(key) {
-            Some(Value::Number(number)) => Ok(number),
-            Some(Value::Text(_)) => Err(self.error(format_args!("{key} must be a whole number"))),
-            None => Err(self.error(format_args!("missing key {key}"))),
+        match self.value(key)? {
+            Value::Number(number) => Ok(number),
+            Value::Text(_) => Err(self.error(format_args!("{key} must be a whole number"))),
         }
     }
 }

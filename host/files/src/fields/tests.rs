@@ -10,6 +10,8 @@ const FILES: &[(&str, &[u8])] = &[
     ("level73.mat", include_bytes!("../small/level73.mat")),
     #[cfg(feature = "hdf5")]
     ("h5py.h5", include_bytes!("../small/h5py.h5")),
+    #[cfg(feature = "hdf5")]
+    ("lzf.h5", include_bytes!("../small/lzf.h5")),
 ];
 
 fn read_all(path: &Path) -> Result<Vec<Field>, FileError> {

@@ -7,6 +7,7 @@
 //! Labels are never read as an image (`super::tests::labels_are_never_read_as_an_image`).
 
 use super::encode_colours;
+use super::signed::text_of;
 use crate::provenance::Provenance;
 use ::image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -62,11 +63,7 @@ pub fn encode_labelled(
 
 /// The labels of a PNG, if it states any. The stream is read up to the first pixel.
 pub(super) fn labels_of(stream: impl BufRead + Seek) -> Option<Result<Labels, serde_json::Error>> {
-    let limits = png::Limits { bytes: 1 << 20 };
-    let reader = png::Decoder::new_with_limits(stream, limits).read_info().ok()?;
-    let texts = &reader.info().uncompressed_latin1_text;
-    let text = texts.iter().find(|text| text.keyword == KEY)?;
-    Some(serde_json::from_str(&text.text))
+    Some(serde_json::from_str(&text_of(stream, KEY).ok()??))
 }
 
 /// The image in a picture with labels, or what is wrong with the picture: found and expected.

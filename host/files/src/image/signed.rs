@@ -3,7 +3,7 @@
 
 use super::{EXPECTED, FileError, open_file};
 use crate::provenance::{KEY, Provenance};
-use std::io::{BufReader, Write};
+use std::io::{BufRead, BufReader, Seek, Write};
 use std::path::Path;
 
 /// Adds the provenance to a picture that is not yet begun.
@@ -33,13 +33,19 @@ pub fn sign<W: Write>(
 pub fn provenance_of(path: &Path) -> Result<Option<Provenance>, FileError> {
     let (file, _) = open_file(path, EXPECTED)?;
     let wrong = |found: String| FileError::kind(path, found, EXPECTED);
-    let limits = png::Limits { bytes: 1 << 20 };
-    let reader = png::Decoder::new_with_limits(BufReader::new(file), limits)
-        .read_info()
-        .map_err(|error| wrong(error.to_string()))?;
-    let texts = &reader.info().uncompressed_latin1_text;
-    let text = texts.iter().find(|text| text.keyword == KEY);
-    text.map(|text| serde_json::from_str(&text.text))
+    let text = text_of(BufReader::new(file), KEY).map_err(|error| wrong(error.to_string()))?;
+    text.map(|text| serde_json::from_str(&text))
         .transpose()
         .map_err(|error| wrong(format!("a damaged provenance: {error}")))
+}
+
+/// The text of this key in a PNG, which is read up to its first pixel.
+pub(super) fn text_of(
+    stream: impl BufRead + Seek,
+    key: &str,
+) -> Result<Option<String>, png::DecodingError> {
+    let limits = png::Limits { bytes: 1 << 20 };
+    let reader = png::Decoder::new_with_limits(stream, limits).read_info()?;
+    let texts = &reader.info().uncompressed_latin1_text;
+    Ok(texts.iter().find(|text| text.keyword == key).map(|text| text.text.clone()))
 }

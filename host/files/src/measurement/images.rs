@@ -16,13 +16,8 @@ const FIELDS: [&str; 3] = ["recon", "image", "images"];
 pub fn read_images_of(path: &Path) -> Result<Stack, FileError> {
     let mut fields = Fields::open(path, false)?;
     let Some(name) = FIELDS.into_iter().find(|name| fields.holds(name)) else {
-        let (path, found) = (path.to_owned(), fields.names().to_vec());
-        return Err(FileError::Missing {
-            path,
-            field: "recon",
-            found,
-            expected: "recon, image or images",
-        });
+        let expected = "recon, image or images";
+        return Err(FileError::missing(path, "recon", fields.names(), expected));
     };
     let field =
         fields.read(name, |shape| match matches!(shape.len(), 2 | 3) && !shape.contains(&0) {

@@ -35,12 +35,14 @@ impl Layout {
         Some(Self { count: usize::try_from(count).ok()?, length, patterns_first })
     }
 
-    /// The index of the measurement to read. A file with a single measurement needs no choice.
+    /// The index of the measurement to read. A file with a single measurement needs no choice. `is_square`: the
+    /// measurements may be one spectrum.
     pub(super) fn choose(
         &self,
         path: &Path,
         field: &str,
         asked: Option<usize>,
+        is_square: bool,
     ) -> Result<usize, FileError> {
         let chosen = asked.or((self.count == 1).then_some(0));
         chosen.filter(|&index| index < self.count).ok_or_else(|| FileError::Choice {
@@ -48,6 +50,7 @@ impl Layout {
             field: field.to_owned().into(),
             count: self.count,
             asked,
+            is_square,
         })
     }
 

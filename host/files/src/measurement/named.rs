@@ -4,14 +4,13 @@
 //! A scene seen through a set gives its image by the set's name (`tests::a_scene_behind_a_set_gives_its_image`).
 
 mod fourier;
-mod s_matrix;
 #[cfg(test)]
 mod tests;
 
 pub(super) use fourier::read_fourier;
 
 use super::patterns::Patterns;
-use nirspi_recon::Size;
+use nirspi_recon::{Size, s_matrix};
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
@@ -49,7 +48,7 @@ impl NamedPatterns {
     /// What was found, and what was expected.
     pub fn patterns(self, size: Option<Size>) -> Result<Patterns, (String, String)> {
         match self {
-            Self::SMatrix { order } => s_matrix::patterns(order, size),
+            Self::SMatrix { order } => of_s_matrix(order, size),
             Self::Fourier { steps } => {
                 let no_size =
                     || ("no size".to_owned(), "the height and width of the image".to_owned());
@@ -88,4 +87,24 @@ impl fmt::Display for NamedPatterns {
             Self::SMatrix { order } => write!(f, "s-matrix:{order}"),
         }
     }
+}
+
+/// The patterns of an S-matrix for images of this size; by default the size of this many pixels that is nearest to a square.
+fn of_s_matrix(order: usize, size: Option<Size>) -> Result<Patterns, (String, String)> {
+    let side = (1..=order.isqrt()).rev().find(|&side| order.is_multiple_of(side)).unwrap_or(1);
+    let size = match size {
+        Some(size) if size.area() == order => size,
+        Some(size) => {
+            let expected =
+                format!("{order} pixels for s-matrix:{order}, such as {side}x{}", order / side);
+            return Err((format!("has {} pixels for {size}", size.area()), expected));
+        }
+        None => Size::new(side, order / side).map_err(|error| {
+            (format!("an image of {side} x {}", order / side), error.to_string())
+        })?,
+    };
+    let row = s_matrix::first_row(order).unwrap_or_default();
+    let moved = |by: usize| (0..order).map(move |at| (at + by) % order);
+    let weights = (0..order).flat_map(moved).map(|at| f64::from(u8::from(row[at]))).collect();
+    Ok(Patterns { size, count: order, weights })
 }

@@ -25,7 +25,7 @@ pub(super) struct Opened {
     pub(super) every_row: Option<Rows>,
     pub(super) form: Form,
     pub(super) remedy: Remedy,
-    side_guessed: bool,
+    pub(super) side_guessed: bool,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
     pub(super) simulated: Option<bool>,
@@ -55,13 +55,7 @@ impl Opened {
         }
         if !has_rows && want.shown.is_none() {
             let expected = "n, h_row, and y or d, or --field h_row=NAME for another name; or --shown ORDER for patterns in a known order";
-            let found = found_names(&fields);
-            return Err(FileError::Missing {
-                path: path.to_owned(),
-                field: "h_row",
-                found,
-                expected,
-            });
+            return Err(FileError::missing(path, "h_row", &found_names(&fields), expected));
         }
         let name = readings_field(&mut fields, want)?;
         let is_d = name == "d";
@@ -74,9 +68,8 @@ impl Opened {
         let (side, mut rows, readings) = match &want.shown {
             None => {
                 let Some(side) = side else {
-                    let (path, found) = (path.to_owned(), found_names(&fields));
                     let expected = "n, h_row, and y or d; or --side N";
-                    return Err(FileError::Missing { path, field: "n", found, expected });
+                    return Err(FileError::missing(path, "n", &found_names(&fields), expected));
                 };
                 if want.remedy.sweeps() > 1 {
                     let expected =

@@ -276,11 +276,9 @@ fn only_array(fields: &mut Fields) -> Result<String, FileError> {
     }
     match &mut found[..] {
         [only] => Ok(std::mem::take(only)),
-        _ => Err(FileError::Missing {
-            path: fields.path().to_owned(),
-            field: "patterns",
-            found: fields.names().to_vec(),
-            expected: "an array `patterns` or `matrix`, or --matrix-field NAME",
-        }),
+        _ => {
+            let expected = "an array `patterns` or `matrix`, or --matrix-field NAME";
+            Err(FileError::missing(fields.path(), "patterns", fields.names(), expected))
+        }
     }
 }

@@ -230,7 +230,7 @@ fn numbers_of(
     }
     let indices = match which {
         Which::One => {
-            let index = layout.choose(path, &readings.name, want.index)?;
+            let index = layout.choose(path, &readings.name, want.index, false)?;
             index..index + 1
         }
         Which::All => 0..layout.count,

@@ -118,7 +118,7 @@ pub(super) fn found_names(fields: &Fields) -> Vec<String> {
 /// Finds the field of the readings.
 pub(super) fn readings_field(fields: &mut Fields, want: &Selection) -> Result<String, FileError> {
     let (path, found) = (fields.path().to_owned(), found_names(fields));
-    let missing = |field, expected| Err(FileError::Missing { path, field, found, expected });
+    let missing = |field, expected| Err(FileError::missing(&path, field, &found, expected));
     if fields.is_unnamed() {
         return match &want.field {
             None => {

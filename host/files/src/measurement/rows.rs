@@ -28,7 +28,11 @@ pub(super) fn shown(
         true => Err("readings".to_owned()),
         false => Ok(()),
     })?;
-    let shape = if want.patterns_first { shape } else { joined(&shape, None, form) };
+    let spectrum = spectrum(&shape, side, form, want.index).map(|n| [n, n]);
+    let shape = match want.patterns_first {
+        true => shape,
+        false => joined(&shape, spectrum.as_ref().map(|axes| &axes[..]), form),
+    };
     let mut axes = shape.iter().copied().filter(|&axis| axis != 1);
     let along = if want.patterns_first { axes.next() } else { axes.next_back() };
     let length = along.unwrap_or(1) as usize;
@@ -80,6 +84,22 @@ pub(super) fn shown(
     let sweep: Vec<Option<u32>> = rows.iter().take(count).map(|&row| Some(row)).collect();
     let rows = sweep.repeat(sweeps);
     Ok((side, rows, NamedReadings::new(label.clone(), layout, numbers)))
+}
+
+/// The side of a spectrum, `(..., n, n)` readings or `(..., n, n, 2)` pairs: the side that the user states, or a side
+/// of whose square no measurement of n patterns is a full sweep. One of (n, n) by its index is no spectrum.
+fn spectrum(shape: &[u64], side: Option<Side>, form: Form, index: Option<usize>) -> Option<u64> {
+    let axes: Vec<u64> = shape.iter().copied().filter(|&axis| axis != 1).collect();
+    let axes = match form {
+        Form::Pairs => axes.strip_suffix(&[2])?,
+        Form::Single | Form::Differences => &axes,
+        Form::Halves => return None,
+    };
+    let [before @ .., height, width] = axes else { return None };
+    let n = Side::new(*width).ok().filter(|_| height == width)?;
+    let is_sweep = Side::new(width.isqrt()).is_ok_and(|side| side.area() == n.pixels());
+    let is_said = |side| side == n && (index.is_none() || !before.is_empty());
+    side.map_or(!is_sweep, is_said).then_some(*width)
 }
 
 pub(super) fn read_side(fields: &mut Fields, want: &Selection) -> Result<Option<Side>, FileError> {

@@ -5,7 +5,9 @@
 //! No number of a table is lost in silence: what is left out is no line of numbers like those of the
 //! table, and is told (`tests::a_table_with_a_gap_is_refused_as_before`).
 
-use super::{BLOCK, Line, Lines, OVERLOAD, Separators, Words, parse, shortened};
+use super::{
+    BLOCK, Line, Lines, OVERLOAD, Separators, Words, columns_of, numbers_of, parse, shortened,
+};
 use crate::FileError;
 use crate::field::Field;
 use nirspi_recon::words::count_of;
@@ -41,65 +43,39 @@ pub(super) fn find(
     decimal_comma: bool,
 ) -> Option<Result<Found, FileError>> {
     let lines = &all.lines;
-    let body = longest(all)?;
+    let (body, table) = match Table::of_numbers(path, all, decimal_comma) {
+        Some(found) => found,
+        None => {
+            let body = longest(lines, &all.marks)?;
+            match Table::of(path, all, body.clone(), decimal_comma)? {
+                Ok(table) => (body, table),
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    };
+    let Table { separators, width, numeric, columns, words, ends } = table;
     let (before, after) = (&lines[..body.start], &lines[body.end..]);
-    if before.len() > MOST_BEFORE || after.len() > MOST_AFTER {
-        return None;
-    }
-    let body = &lines[body];
-    let above = before.last().map(|(_, line)| *line);
-    let separators = match Separators::of(path, above, all, body, decimal_comma) {
-        Ok(separators) => separators,
-        Err(error) => return Some(Err(error)),
-    };
-    let between = separators.between;
-    let width = cells(body[0].1, between).count();
     let number = |word: &str| parse(word, separators.decimal);
-    let blocks: Option<Vec<Block>> =
-        body.par_chunks(BLOCK).map(|lines| Block::of(lines, between, width, number)).collect();
-    let blocks = blocks?;
-    let count = |of: fn(&Block) -> &[usize], at: usize| -> usize {
-        blocks.iter().map(|block| of(block)[at]).sum()
+    // Beside a number, a preamble has a name where the table has a time.
+    let has_digit = |word: &str| word.contains(|c: char| c.is_ascii_digit());
+    let of_table = |(_, line): &Line<'_>| {
+        let mut beside = cells(line, separators.between)
+            .zip(cells(lines[body.start].1, separators.between))
+            .enumerate()
+            .filter(|(at, _)| !numeric.contains(at));
+        is_row(line, &separators, width, &numeric)
+            && beside.all(|(_, (one, other))| has_digit(one) == has_digit(other))
     };
-    // At least half of the column's cells are numbers.
-    let is_numeric = |&at: &usize| 2 * count(|block| &block.numbers, at) >= body.len();
-    let numeric: Vec<usize> = (0..width).filter(is_numeric).collect();
-    let is_row = |line: &str| {
-        let row: Vec<&str> = cells(line, between).collect();
-        row.len() == width && numeric.iter().all(|&at| number(row[at]).is_some())
-    };
-    if numeric.is_empty() || before.iter().chain(after).any(|(_, line)| is_row(line)) {
+    if numeric.is_empty() || before.iter().chain(after).any(of_table) {
         return None;
     }
-    // A last line of totals.
-    let rows_end = body.iter().rposition(|(_, line)| is_row(line)).map_or(0, |last| last + 1);
-    let ends = body.len() - rows_end;
-    if ends > MOST_AFTER || rows_end < LEAST_LINES {
-        return None;
-    }
-    let cell = |row: usize, at: usize| blocks[row / BLOCK].cells[row % BLOCK * width + at];
-    let is_missing = |row: usize| numeric.iter().copied().find(|&at| cell(row, at).is_none());
-    if let Some((row, at)) = (0..rows_end).find_map(|row| Some((row, is_missing(row)?))) {
-        let (line, content) = body[row];
-        let word = cells(content, between).nth(at).unwrap_or_default();
-        let found = format!("has {:?} in line {line}", shortened(word));
-        return Some(Err(FileError::field(path, "table", found, "a number")));
-    }
-    let column = |&at: &usize| {
-        let cells = blocks.iter().flat_map(|block| block.cells.iter().skip(at).step_by(width));
-        let real: Vec<f64> = cells.take(rows_end).map(|cell| cell.unwrap_or(f64::NAN)).collect();
-        Field { shape: vec![real.len()], real, imaginary: None }
-    };
-    let columns: Vec<Field> = numeric.par_iter().map(column).collect();
-    let (heading, units) = heading(before, between, &numeric, number);
+    let (heading, units) = heading(before, separators.between, &numeric, number);
     let named = |heading: &Vec<&str>, at: usize| heading[at].trim_matches('"').trim().to_owned();
-    let words: Vec<String> = (0..width)
-        .filter(|at| !numeric.contains(at) && count(|block| &block.filled, *at) > 0)
-        .map(|at| match heading.as_ref().filter(|heading| at < heading.len()) {
-            Some(heading) => format!("`{}`", shortened(&named(heading, at))),
-            None => format!("{}", at + 1),
-        })
-        .collect();
+    let word = |at: usize| match heading.as_ref().filter(|heading| at < heading.len()) {
+        Some(heading) => format!("`{}`", shortened(&named(heading, at))),
+        None => format!("{}", at + 1),
+    };
+    let words: Vec<String> = words.into_iter().map(word).collect();
     let headed = usize::from(heading.is_some()) + usize::from(units);
     let mut skipped = Vec::new();
     if before.len() > headed {
@@ -119,6 +95,109 @@ pub(super) fn find(
     let told = || format!("left out of the text: {}", skipped.join("; "));
     let skipped = (!skipped.is_empty()).then(told);
     Some(Ok(Found { columns, names, skipped }))
+}
+
+/// Whether a line outside of a table is a row like those of the table: numbers in the columns with numbers,
+/// of which a few may be missing.
+fn is_row(line: &str, separators: &Separators, width: usize, numeric: &[usize]) -> bool {
+    let row: Vec<&str> = cells(line, separators.between).collect();
+    row.len() == width
+        && numeric.iter().all(|&at| parse(row[at], separators.decimal).is_some())
+        && numeric.iter().any(|&at| !row[at].is_empty())
+}
+
+/// The lines of a table.
+struct Table {
+    separators: Separators,
+    /// Number of cells of a line.
+    width: usize,
+    /// The columns of numbers, and their numbers.
+    numeric: Vec<usize>,
+    columns: Vec<Field>,
+    /// The columns of words.
+    words: Vec<usize>,
+    /// Lines at the end that are no rows.
+    ends: usize,
+}
+
+impl Table {
+    /// A long table of nothing but numbers, from below other lines to the end of the text, as [`Table::of`] finds
+    /// it, in one pass.
+    fn of_numbers(
+        path: &Path,
+        all: &Lines<'_>,
+        decimal_comma: bool,
+    ) -> Option<(std::ops::Range<usize>, Self)> {
+        let first = all.lines.get(..4 * MOST_BEFORE)?;
+        let start = longest(first, &all.marks).filter(|run| run.end == first.len())?.start;
+        let (before, body) = all.lines.split_at(start);
+        let above = before.last().map(|(_, line)| *line);
+        let separators = Separators::of(path, above, all, body, decimal_comma).ok()?;
+        let count = separators.split(body[0].1).count();
+        let numbers = numbers_of(path, body, &separators, count).ok()?;
+        if before.len() > MOST_BEFORE || numbers.iter().any(|number| number.is_nan()) {
+            return None;
+        }
+        let width = cells(body[0].1, separators.between).count();
+        let (numeric, columns) = ((0..count).collect(), columns_of(&numbers, count));
+        let table = Self { separators, width, numeric, columns, words: Vec::new(), ends: 0 };
+        Some((start..all.lines.len(), table))
+    }
+
+    /// The table in these lines; `None` if they are none.
+    fn of(
+        path: &Path,
+        all: &Lines<'_>,
+        body: std::ops::Range<usize>,
+        decimal_comma: bool,
+    ) -> Option<Result<Self, FileError>> {
+        let (before, after) = (&all.lines[..body.start], &all.lines[body.end..]);
+        if before.len() > MOST_BEFORE || after.len() > MOST_AFTER {
+            return None;
+        }
+        let body = &all.lines[body];
+        let above = before.last().map(|(_, line)| *line);
+        let separators = match Separators::of(path, above, all, body, decimal_comma) {
+            Ok(separators) => separators,
+            Err(error) => return Some(Err(error)),
+        };
+        let between = separators.between;
+        let width = cells(body[0].1, between).count();
+        let number = |word: &str| parse(word, separators.decimal);
+        let blocks: Option<Vec<Block>> =
+            body.par_chunks(BLOCK).map(|lines| Block::of(lines, between, width, number)).collect();
+        let blocks = blocks?;
+        let count = |of: fn(&Block) -> &[usize], at: usize| -> usize {
+            blocks.iter().map(|block| of(block)[at]).sum()
+        };
+        // At least half of the column's cells are numbers.
+        let is_numeric = |&at: &usize| 2 * count(|block| &block.numbers, at) >= body.len();
+        let (numeric, words): (Vec<usize>, Vec<usize>) = (0..width).partition(is_numeric);
+        let words = words.into_iter().filter(|&at| count(|block| &block.filled, at) > 0).collect();
+        // A last line of totals.
+        let is_row = |(_, line): &Line<'_>| is_row(line, &separators, width, &numeric);
+        let rows_end = body.iter().rposition(is_row).map_or(0, |last| last + 1);
+        let ends = body.len() - rows_end;
+        if ends > MOST_AFTER || rows_end < LEAST_LINES {
+            return None;
+        }
+        let cell = |row: usize, at: usize| blocks[row / BLOCK].cells[row % BLOCK * width + at];
+        let is_missing = |row: usize| numeric.iter().copied().find(|&at| cell(row, at).is_none());
+        if let Some((row, at)) = (0..rows_end).find_map(|row| Some((row, is_missing(row)?))) {
+            let (line, content) = body[row];
+            let word = cells(content, between).nth(at).unwrap_or_default();
+            let found = format!("has {:?} in line {line}", shortened(word));
+            return Some(Err(FileError::field(path, "table", found, "a number")));
+        }
+        let column = |&at: &usize| {
+            let cells = blocks.iter().flat_map(|block| block.cells.iter().skip(at).step_by(width));
+            let real: Vec<f64> =
+                cells.take(rows_end).map(|cell| cell.unwrap_or(f64::NAN)).collect();
+            Field { shape: vec![real.len()], real, imaginary: None }
+        };
+        let columns: Vec<Field> = numeric.par_iter().map(column).collect();
+        Some(Ok(Self { separators, width, numeric, columns, words, ends }))
+    }
 }
 
 /// The cells of some lines.
@@ -160,7 +239,7 @@ impl Block {
 }
 
 /// The longest run of lines with the same number of cells, some of them numbers.
-fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
+fn longest(lines: &[Line<'_>], marks: &[char]) -> Option<std::ops::Range<usize>> {
     let (mut best, mut parted) = (0..0, None);
     let mut has_whole = false;
     // A number with a comma is one with a decimal comma.
@@ -169,7 +248,7 @@ fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
         !word.trim_matches('"').is_empty() && parse(word, decimal).is_some()
     };
     for between in [Some(';'), Some('\t'), Some(','), None] {
-        if !all.marks.contains(&between.unwrap_or(' ')) {
+        if !marks.contains(&between.unwrap_or(' ')) {
             // Lines without the mark are one cell each, whatever the mark is.
             if std::mem::replace(&mut has_whole, true) {
                 continue;
@@ -181,8 +260,7 @@ fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
             let has_number = cells.by_ref().inspect(|_| count += 1).any(is_number);
             (count + cells.count(), has_number)
         };
-        let shapes: Vec<(usize, bool)> =
-            all.lines.par_iter().with_min_len(BLOCK).map(shape).collect();
+        let shapes: Vec<(usize, bool)> = lines.par_iter().with_min_len(BLOCK).map(shape).collect();
         let mut start = 0;
         for run in shapes.chunk_by(|a, b| a == b) {
             if run[0].1 && run.len() > best.len() {
@@ -192,7 +270,7 @@ fn longest(all: &Lines<'_>) -> Option<std::ops::Range<usize>> {
         }
     }
     // A heading may have words that stand for numbers, such as `NA`. A word above a number tells it.
-    if let [(_, first), (_, second), ..] = &all.lines[best.clone()] {
+    if let [(_, first), (_, second), ..] = &lines[best.clone()] {
         let mut pairs = cells(first, parted).zip(cells(second, parted));
         let is_word = |word: &str| !word.is_empty() && !is_number(word);
         best.start += usize::from(pairs.any(|(above, below)| is_word(above) && is_number(below)));
@@ -245,9 +323,11 @@ fn cells(line: &str, between: Option<char>) -> Words<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Numbers, read};
+    use super::super::{Lines, Numbers, read};
+    use super::{Table, longest};
     use crate::testing::{file, line};
     use std::fmt::Write;
+    use std::path::Path;
 
     /// The columns of a text by their names, and what was left out.
     fn columns(content: &str) -> (Vec<(String, Vec<f64>)>, String) {
@@ -298,6 +378,14 @@ mod tests {
         assert_eq!(found, [expected("Samples", k), expected("Power (W)", y)]);
         let told = "3 lines before the table; columns that hold words: `Date`, `Time`";
         assert!(skipped.ends_with(told), "{skipped}");
+        // A preamble with numbers, above times.
+        let text = format!(
+            "t0\t10:00:00\ndelta t\t1,5E-3\n\ntime\ty\n{}",
+            rows(|k| format!("10:00:0{k}\t{},5", 8 - k))
+        );
+        let (found, skipped) = columns(&text);
+        assert_eq!(found, [expected("y", y)]);
+        assert!(skipped.ends_with("2 lines before the table; columns that hold words: `time`"));
         // A serial monitor.
         let (found, _) = columns(&rows(|k| format!("14:02:0{k}.000 -> {}", y(k))));
         assert_eq!(found, [expected("[9, 1]", y)]);
@@ -335,6 +423,10 @@ mod tests {
                 assert_eq!(columns(&format!("time,{name}\n{text}")).0, wanted);
             }
         }
+        for name in ["Power 1550 nm (W)", "Phase offset: 2/3 pi"] {
+            let text = format!("time,{name}\n{}", rows(|k| format!("{k},{}", y(k))));
+            assert_eq!(columns(&text).0, [expected("time", k), expected(name, y)]);
+        }
         // A name may begin with any letter.
         let text = format!("µs;y\n{}", rows(|k| format!("{k};{}", y(k))));
         assert_eq!(columns(&text).0, [expected("µs", k), expected("y", y)]);
@@ -348,6 +440,42 @@ mod tests {
         assert_eq!(told, "another column is called `y`, too: here `y.1`");
     }
 
+    /// A long table of numbers is found in one pass, and is the one that is found cell by cell.
+    #[test]
+    fn one_pass_finds_what_is_found_cell_by_cell() {
+        let rows = |end: &str, mark: char, decimal: &str| {
+            let cell = |v: f64| format!("{v:.3}").replace('.', decimal);
+            (0..600).fold(String::new(), |text, k| {
+                let k = f64::from(k);
+                text + &format!("{}{mark}{}{end}\n", cell(k), cell(8.5 - k * k % 7.0))
+            })
+        };
+        let preamble = "Model,MSO5\nFirmware Version,1.28\n,\n,\nLabel,\nTIME,CH1\n";
+        for (before, rows, is_one_pass) in [
+            (preamble, rows("", ',', "."), true),
+            ("X,CH1,Start,Increment\nSequence,Volt,-6e-4,1e-6\n", rows(",,", ',', "."), false),
+            ("X,CH1,\ns,Volt,\n", rows(",", ',', "."), true),
+            ("Zeit;Kanal A\n(ms);(V)\n", rows("", ';', ","), true),
+            ("a log\nt\ty\n", rows("", '\t', "."), true),
+            ("a log\nt\ty\n", rows("", '\t', ",").replace("8,500", "OL"), true),
+            ("a log\nt,y\n", rows("", ',', ".").replace("8.500", "nan"), false),
+            ("a log\nt,y,word\n", rows(",ok", ',', "."), false),
+            ("a log\nt,y\n", rows("", ',', ".") + "total,5\n", false),
+        ] {
+            let (path, text) = (Path::new("y.csv"), format!("{before}{rows}"));
+            let lines = Lines::of(&text);
+            let body = longest(&lines.lines, &lines.marks).unwrap();
+            let by_cell = Table::of(path, &lines, body.clone(), false).unwrap().unwrap();
+            let one_pass = Table::of_numbers(path, &lines, false);
+            assert_eq!(one_pass.is_some(), is_one_pass, "{before}");
+            let Some((range, found)) = one_pass else { continue };
+            assert_eq!((range, found.width), (body, by_cell.width), "{before}");
+            assert_eq!((found.numeric, found.columns), (by_cell.numeric, by_cell.columns));
+            assert_eq!((found.words, found.ends), (by_cell.words, by_cell.ends));
+            assert!(columns(&text).0.iter().all(|(_, column)| column.len() == 600), "{before}");
+        }
+    }
+
     #[test]
     fn a_table_with_a_gap_is_refused_as_before() {
         for wrong in [
@@ -356,6 +484,8 @@ mod tests {
             format!("{}3,4,5\n1,2.5\n", rows(|k| format!("{k},1.5"))),
             // A word in the middle of a column of numbers.
             format!("a,b\n{}3,x\n{}", rows(|k| format!("{k},1.5")), rows(|k| format!("{k},2.5"))),
+            // A line of the table behind another one, with a word beside its number.
+            format!("{}lost\nk 9,1.5\n", rows(|k| format!("k {k},1.5"))),
             // More lines behind the table than a footer has.
             format!("{}end\n of\nthe\nlog\n", rows(|k| format!("{k},1.5"))),
         ] {

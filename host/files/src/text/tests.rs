@@ -121,6 +121,11 @@ fn a_decimal_comma_is_seen_where_the_file_shows_it_and_asked_for_where_not() {
     let (_folder, path) = file("y.csv", b"h_row,d\n0,15\n3,-4\n");
     let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else { panic!("columns") };
     assert_eq!(columns[1].1.real, [15.0, -4.0]);
+    // A date is no number with points.
+    let (_folder, path) =
+        file("y.txt", ("t;y\n".to_owned() + &"20.11.2026 10:00;1,5\n".repeat(8)).as_bytes());
+    let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else { panic!("columns") };
+    assert_eq!((&*columns[0].0, columns[0].1.real.last()), ("y", Some(&1.5)));
     let (_folder, path) = file("y.txt", b"1,5;2.5\n");
     assert!(line(&read(&path, false).err().unwrap(), "y.txt").contains("points and commas"));
 }
@@ -176,6 +181,25 @@ fn lists_in_brackets_are_rows() {
     ] {
         let expected = [1.0, 2.5, 3.0].repeat(shape[0]);
         assert_eq!(table(list), (shape.to_vec(), expected), "{list}");
+    }
+}
+
+#[test]
+fn numbers_behind_the_names_that_the_arduinos_plotter_shows_are_columns() {
+    type Columns = Vec<(String, Vec<f64>)>;
+    let columns = |content: &str| -> Result<Columns, String> {
+        let (_folder, path) = file("y.txt", content.as_bytes());
+        let read = read(&path, false).map_err(|error| line(&error, "y.txt"))?;
+        let Numbers::Columns(columns) = read.numbers else { panic!("columns") };
+        Ok(columns.into_iter().map(|(name, field)| (name, field.real)).collect())
+    };
+    let of = |name: &str, numbers: [f64; 2]| (name.to_owned(), numbers.to_vec());
+    assert_eq!(columns("A0:1.5\r\nA0:-2\r\n"), Ok(vec![of("A0", [1.5, -2.0])]));
+    let two = Ok(vec![of("light", [71.0, 72.0]), of("limit", [90.0, 90.0])]);
+    assert_eq!(columns("light:71,limit:90\nlight:72,limit:90\n"), two);
+    assert_eq!(columns("light:71\tlimit:90\n\nlight:72\tlimit:90\n"), two);
+    for other in ["A0:1\nA1:2\n", "A0:1\nA0:\n", "A0:1\nA0:1,A1:2\n", "10:02\n10:03\n"] {
+        assert!(columns(other).unwrap_err().contains(", expected "), "{other}");
     }
 }
 

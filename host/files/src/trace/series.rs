@@ -11,9 +11,8 @@ use crate::array::{ArrayError, Header, MAGIC, Take};
 use crate::field::EXPECTED as MEASUREMENTS;
 use crate::fields::{Fields, UNNAMED};
 use crate::npy;
-use crate::plain::open_file;
+use crate::plain::open_start;
 use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The kind of file that a path should lead to, for error messages.
@@ -67,15 +66,10 @@ impl Series {
         raw: Option<Raw>,
         decimal_comma: bool,
     ) -> Result<Self, FileError> {
-        let (mut file, length) = open_file(path, EXPECTED)?;
+        let (_, length, start) = open_start(path, EXPECTED, MAGIC.len())?;
         if let Some(raw) = raw {
             return Self::open_raw(path, raw, length);
         }
-        let mut start = Vec::new();
-        file.by_ref()
-            .take(MAGIC.len() as u64)
-            .read_to_end(&mut start)
-            .map_err(|error| FileError::io(path, "read", error))?;
         let form = match &*start {
             _ if decimal_comma => Form::Other(open_fields(path, true)?),
             start if start == MAGIC => Form::Npy,

@@ -5,10 +5,11 @@
 //! more light of coarse patterns. Readings of other patterns know little of each other.
 
 use super::dropout::{dark_level, local_level};
+use super::ends::{End, ends};
 use super::robust::{correlation_of_changes, deviation, median, running_median, step};
 use super::{
-    Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, Lamp, Outlier, Reading, dropout,
-    few, repeats,
+    Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, Lamp, Outlier, Places, Reading,
+    dropout, few, repeats,
 };
 use crate::measurements::{MeasurementError, expect_finite};
 use crate::{Measurements, Rows, order};
@@ -46,12 +47,6 @@ const LEVEL: usize = 63;
 /// The share of the expected all-on reading by which a saturated one is lower.
 const SATURATED_SHARE: f64 = 0.06;
 
-/// Least share of the readings that are equal where they are clipped, least number, and how many times
-/// more often than the next value.
-const CLIPPED_SHARE: f64 = 0.01;
-const CLIPPED_LEAST: usize = 4;
-const PILED_UP: usize = 2;
-
 /// Readings in pairs, and what they would be by the law.
 struct Claimed<'p> {
     pairs: &'p [[f64; 2]],
@@ -61,25 +56,22 @@ struct Claimed<'p> {
     noise: f64,
 }
 
-pub(super) fn read(rows: &Rows, y: &[f64], claim: Claim) -> Result<Reading, MeasurementError> {
+pub(super) fn read(
+    rows: &Rows,
+    y: &[f64],
+    claim: Claim,
+    places: Option<Places<'_>>,
+) -> Result<Reading, MeasurementError> {
     let pairs = y.as_chunks::<2>().0;
     let first = rows.iter().position(|&row| row == 0);
     let mut doubts = Vec::new();
-    let other = other_form(rows, pairs, claim);
+    let other = other_form(rows, pairs, claim, places);
     if let Some(doubt) = other {
         doubts.push(doubt);
         // A finding about single readings would rest on the wrong partner.
         if !doubt.is_of_sign() {
             let measurements = differences(rows, pairs, |_| true)?;
-            let (dropouts, outliers) = (Vec::new(), Vec::new());
-            return Ok(Reading {
-                measurements,
-                dropouts,
-                outliers,
-                doubts,
-                dark_level: None,
-                lamp: None,
-            });
+            return Ok(Reading::of(measurements, Vec::new(), doubts));
         }
     }
     let upright: Vec<[f64; 2]> = match other {
@@ -272,21 +264,27 @@ impl Claimed<'_> {
 }
 
 /// Another form that explains the readings better than the claimed one.
-fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
-    let count = pairs.len();
+fn other_form(
+    rows: &Rows,
+    pairs: &[[f64; 2]],
+    claim: Claim,
+    places: Option<Places<'_>>,
+) -> Option<Doubt> {
     let first = rows.iter().position(|&row| row == 0);
-    if 2 * count <= super::FEWEST_EQUAL {
+    if 2 * pairs.len() <= super::FEWEST_EQUAL {
         return None;
     }
-    let recorded = as_recorded(pairs, claim.form);
-    if let (true, Some(first)) = (claim.side_guessed, first)
+    let recorded = as_recorded(&Places::filled(places, pairs), claim.form);
+    let count = recorded.len() / 2;
+    let first = first?;
+    let place = Places::of(places, first);
+    if claim.side_guessed
         && claim.form == Form::Pairs
-        && let Some(sweeps) = repeats::sweeps(&recorded, 2, first)
+        && let Some(sweeps) = repeats::sweeps(&recorded, 2, place)
     {
         let explanation = Explanation::Sweeps { count: sweeps };
         return Some(Doubt::Repeated { readings: recorded.len(), explanation });
     }
-    let first = first?;
     let rearranged: Vec<[f64; 2]> = match claim.form {
         Form::Halves => recorded.as_chunks::<2>().0.to_vec(),
         _ => (0..count).map(|k| [recorded[k], recorded[count + k]]).collect(),
@@ -330,22 +328,22 @@ fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
     };
     let form = if claim.form == Form::Halves { Form::Pairs } else { Form::Halves };
     let with = |pairs| Claimed { pairs, first: None, noise };
-    let [other_on, other_off] = rearranged[first];
+    let [other_on, other_off] = rearranged[place];
     if with(&rearranged[..]).keeps(other_on, other_off) {
         offer(better(&rearranged, other_on - other_off), Explanation::Form(form));
     } else if with(&rearranged[..]).keeps_swapped(other_on, other_off) {
         offer(better(&rearranged, other_off - other_on), Explanation::ComplementsFirst(form));
     }
     // The all-off reading before the others says that the all-on reading before it is missing.
-    let starts_dark = |off: f64, tolerance: f64| first == 0 && recorded[0] < off - tolerance;
-    if let Some(&[on, off]) = shifted.get(first)
+    let starts_dark = |off: f64, tolerance: f64| place == 0 && recorded[0] < off - tolerance;
+    if let Some(&[on, off]) = shifted.get(place)
         && with(&shifted[..]).keeps(on, off)
         && !starts_dark(off, with(&shifted[..]).tolerance(on, off))
     {
         offer(better(&shifted, on - off), Explanation::OneLate);
     }
     if !shifted.is_empty() {
-        let (on, off) = match first.checked_sub(1) {
+        let (on, off) = match place.checked_sub(1) {
             Some(before) => (shifted[before][0], shifted[before][1]),
             // The all-on reading is the missing one.
             None => (median(sums(&shifted)) - recorded[0], recorded[0]),
@@ -365,7 +363,7 @@ fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
     {
         let averaged = repeats::averaged(&recorded, each);
         let averaged = averaged.as_chunks::<2>().0;
-        if let Some(&[on, off]) = averaged.get(first)
+        if let Some(&[on, off]) = averaged.get(place)
             && (Claimed { pairs: averaged, first: None, noise: steady }).keeps(on, off)
         {
             let (broken, explanation) = (sampled, Explanation::Samples { each });
@@ -384,7 +382,7 @@ fn other_form(rows: &Rows, pairs: &[[f64; 2]], claim: Claim) -> Option<Doubt> {
             false => Explanation::ComplementsFirst(claim.form),
         });
     }
-    let brightest = (0..count).max_by(|&a, &b| pairs[a][0].total_cmp(&pairs[b][0]))?;
+    let brightest = (0..pairs.len()).max_by(|&a, &b| pairs[a][0].total_cmp(&pairs[b][0]))?;
     let [on, off] = pairs[brightest];
     // Other partners are the right ones, and not in any form that is known.
     let gain = |other: &[[f64; 2]]| (partnership(other) - own) * (other.len() as f64).sqrt();
@@ -549,24 +547,15 @@ fn clipped(pairs: &[[f64; 2]], first: Option<usize>) -> Option<(Doubt, f64)> {
     let first = first?;
     let [on, off] = pairs[first];
     let readings = pairs.as_flattened();
-    let noise = noise(pairs);
     let others = running_median(&sums(pairs), LEVEL)[first];
-    let enough = ((CLIPPED_SHARE * readings.len() as f64) as usize).max(CLIPPED_LEAST);
-    let mut sorted = readings.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let says = |value: f64, equal: usize, next: usize, extreme, is_cut: bool| {
-        (is_cut && equal >= enough && equal > PILED_UP * next)
-            .then_some((Doubt::Clipped { readings: readings.len(), equal, value, extreme }, value))
+    let [least, most] = ends(readings);
+    let says = |end: &End, extreme, is_cut: bool| {
+        (is_cut && end.is_pile).then(|| (end.clipped(readings.len(), extreme), end.value))
     };
-    let limit = (SATURATED_SHARE * (others - 2.0 * off).abs()).max(LAW_SIGMAS * noise);
-    let (least, most) = (sorted[0], sorted[sorted.len() - 1]);
-    let run = |value: f64| sorted.iter().filter(|&&y| y == value).count();
-    let below = sorted.iter().rev().find(|&&y| y != most).map_or(0, |&next| run(next));
-    let above = sorted.iter().find(|&&y| y != least).map_or(0, |&next| run(next));
-    let cut_above = on == most && on + off < others - limit;
-    let cut_below = off == least && on + off > others + limit;
-    says(most, run(most), below, Extreme::Greatest, cut_above)
-        .or_else(|| says(least, run(least), above, Extreme::Least, cut_below))
+    let limit = (SATURATED_SHARE * (others - 2.0 * off).abs()).max(LAW_SIGMAS * noise(pairs));
+    let cut_above = on == most.value && on + off < others - limit;
+    let cut_below = off == least.value && on + off > others + limit;
+    says(&most, Extreme::Greatest, cut_above).or_else(|| says(&least, Extreme::Least, cut_below))
 }
 
 /// Below this a reading is nearer to darkness than to the usual reading.

@@ -1,9 +1,10 @@
 //! Readings of patterns alone, and differences: one value a pattern.
 
+use super::ends::ends;
 use super::robust::{deviation, median, step};
 use super::{
-    Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, OVERLOAD, Outlier, Reading, few,
-    repeats,
+    Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, OVERLOAD, Outlier, Places,
+    Reading, few, repeats,
 };
 use crate::measurements::{MeasurementError, Measurements};
 use crate::{Rows, order};
@@ -15,12 +16,6 @@ const LAW_SIGMAS: f64 = 8.0;
 
 /// The same number of standard deviations where a tenth of the values breaks the law.
 const MANY_SIGMAS: f64 = 5.0;
-
-/// Least share and number of readings that are equal where they are clipped, and how many times more
-/// often than the next value.
-const CLIPPED_SHARE: f64 = 0.01;
-const CLIPPED_LEAST: usize = 4;
-const PILED_UP: usize = 2;
 
 /// How many times more the all-on difference is than any other where an order is named.
 const STANDS_OUT: f64 = 1.5;
@@ -50,11 +45,12 @@ pub(super) fn read_single(
     rows: &Rows,
     y: &[f64],
     claim: Claim,
+    places: Option<Places<'_>>,
 ) -> Result<Reading, MeasurementError> {
     let mut doubts = Vec::new();
     let mut outliers = Vec::new();
     let first = rows.iter().position(|&row| row == 0);
-    doubts.extend(repeated(y, first, claim));
+    doubts.extend(repeated(y, first, claim, places));
     if let (Some(first), true) = (first, doubts.is_empty()) {
         let on = y[first];
         let usual = median(y.to_vec());
@@ -67,13 +63,7 @@ pub(super) fn read_single(
         let many = beyond(MANY_SIGMAS).len();
         let above = beyond(LAW_SIGMAS);
         if above.len() <= few(y.len()) && many <= y.len() / 10 {
-            let outlier = |&k: &usize| Outlier {
-                reading: k,
-                value: y[k],
-                row: rows[k],
-                why: Impossible::AboveAllOn { all_on: on },
-            };
-            outliers = above.iter().map(outlier).collect();
+            outliers = above_all_on(rows, y, &above, on);
             doubts.extend(clipped(y, on));
         } else {
             let broken = Broken { readings: y.len(), above: many, below: 0 };
@@ -101,19 +91,20 @@ pub(super) fn read_single(
             }
         }
     }
-    Ok(Reading { measurements, dropouts: Vec::new(), outliers, doubts, dark_level, lamp: None })
+    Ok(Reading { dark_level, ..Reading::of(measurements, outliers, doubts) })
 }
 
 pub(super) fn read_differences(
     rows: &Rows,
     d: &[f64],
     claim: Claim,
+    places: Option<Places<'_>>,
 ) -> Result<Reading, MeasurementError> {
     let mut doubts = Vec::new();
     let mut outliers = Vec::new();
     let first = rows.iter().position(|&row| row == 0);
     if !keeps_the_law(rows, d) || claim.side_guessed {
-        doubts.extend(repeated(d, first, claim));
+        doubts.extend(repeated(d, first, claim, places));
     }
     if let (Some(first), true) = (first, doubts.is_empty() && !keeps_the_law(rows, d)) {
         let on = d[first];
@@ -142,25 +133,20 @@ pub(super) fn read_differences(
             let explanation = Explanation::Inverted;
             doubts.push(Doubt::Form { claimed: Form::Differences, broken, explanation });
         } else {
-            let outlier = |&k: &usize| Outlier {
-                reading: k,
-                value: d[k],
-                row: rows[k],
-                why: Impossible::AboveAllOn { all_on: on },
-            };
-            outliers = larger.iter().map(outlier).collect();
+            outliers = above_all_on(rows, d, &larger, on);
         }
     }
     let (rows, d) = without(rows, d, &outliers);
     let measurements = Measurements::from_differential(&rows, &d)?;
-    Ok(Reading {
-        measurements,
-        dropouts: Vec::new(),
-        outliers,
-        doubts,
-        dark_level: None,
-        lamp: None,
-    })
+    Ok(Reading::of(measurements, outliers, doubts))
+}
+
+/// Values that are above that of the all-on pattern.
+fn above_all_on(rows: &Rows, values: &[f64], which: &[usize], all_on: f64) -> Vec<Outlier> {
+    let why = Impossible::AboveAllOn { all_on };
+    let of =
+        |&reading: &usize| Outlier { reading, value: values[reading], row: rows[reading], why };
+    which.iter().map(of).collect()
 }
 
 /// The position of a difference that stands out from all others, if there is one.
@@ -171,11 +157,17 @@ fn brightest(d: &[f64], first: usize) -> Option<usize> {
 }
 
 /// What repeats itself in values whose number gave the side of the image.
-fn repeated(values: &[f64], first: Option<usize>, claim: Claim) -> Option<Doubt> {
-    let first = first.filter(|_| claim.side_guessed)?;
-    let explanation = match repeats::sweeps(values, 1, first) {
+fn repeated(
+    values: &[f64],
+    first: Option<usize>,
+    claim: Claim,
+    places: Option<Places<'_>>,
+) -> Option<Doubt> {
+    let first = Places::of(places, first.filter(|_| claim.side_guessed)?);
+    let recorded = Places::filled(places, values);
+    let explanation = match repeats::sweeps(&recorded, 1, first) {
         Some(count) => Explanation::Sweeps { count },
-        None => Explanation::Samples { each: repeats::samples(values, true)? },
+        None => Explanation::Samples { each: repeats::samples(&recorded, true)? },
     };
     Some(Doubt::Repeated { readings: values.len(), explanation })
 }
@@ -183,20 +175,9 @@ fn repeated(values: &[f64], first: Option<usize>, claim: Claim) -> Option<Doubt>
 /// Whether many readings are equal to that of the all-on pattern, and no scene of a single point explains
 /// that.
 fn clipped(y: &[f64], on: f64) -> Option<Doubt> {
-    let mut sorted = y.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let (least, most) = (sorted[0], sorted[sorted.len() - 1]);
-    let run = |value: f64| sorted.iter().filter(|&&y| y == value).count();
-    let enough = ((CLIPPED_SHARE * y.len() as f64) as usize).max(CLIPPED_LEAST);
-    let equal = run(most);
-    let next = sorted.iter().rev().find(|&&y| y != most).map_or(0, |&next| run(next));
-    (on == most && equal >= enough && equal > PILED_UP * next && equal + run(least) < y.len())
-        .then_some(Doubt::Clipped {
-            readings: y.len(),
-            equal,
-            value: most,
-            extreme: Extreme::Greatest,
-        })
+    let [least, most] = ends(y);
+    let is_cut = on == most.value && most.is_pile && most.equal + least.equal < y.len();
+    is_cut.then(|| most.clipped(y.len(), Extreme::Greatest))
 }
 
 /// Rows and values without outliers.

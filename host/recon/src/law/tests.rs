@@ -284,6 +284,57 @@ fn readings_of_another_form_are_named_by_it() {
     }
 }
 
+/// A pattern that was not read leaves a gap in its recording, and the form of the other readings is seen all the same.
+#[test]
+fn patterns_that_were_not_read_hide_no_form() {
+    for (name, rows, y) in recordings() {
+        let count = rows.len();
+        let half = |reading: usize| y.iter().skip(reading).step_by(2).copied();
+        let halves: Vec<f64> = half(0).chain(half(1)).collect();
+        let split: Vec<f64> = (0..count).flat_map(|k| [y[k], y[count + k]]).collect();
+        let early: Vec<f64> = y[1..].iter().chain(&y[..1]).copied().collect();
+        let patterns: Vec<f64> = half(0).collect();
+        let samples = |y: &[f64]| y.iter().flat_map(|&y| [y; 4]).collect::<Vec<f64>>();
+        let named = |form| Explanation::Form(form);
+        let larger = Rows::natural(side(2 * rows.side().pixels() as u64));
+        let mut cases = vec![
+            (&rows, Form::Pairs, halves, named(Form::Halves), false),
+            (&rows, Form::Halves, split, named(Form::Pairs), false),
+            (&rows, Form::Pairs, early, Explanation::OneEarly, false),
+        ];
+        if rows.side().pixels() == 16 && !name.contains("scene 2") && !name.contains("noise") {
+            let (each, count) = (4, 4);
+            cases.extend([
+                (&larger, Form::Pairs, samples(&y), Explanation::Samples { each }, true),
+                (&larger, Form::Pairs, y.repeat(4), Explanation::Sweeps { count }, true),
+                (&larger, Form::Single, samples(&patterns), Explanation::Samples { each }, true),
+                (&larger, Form::Single, patterns.repeat(4), Explanation::Sweeps { count }, true),
+            ]);
+        }
+        for (rows, form, y, expected, side_guessed) in cases {
+            for gap in [rows.len() / 3, rows.len() - 1, 101] {
+                let is_read = |k: &usize| *k == 0 || !k.is_multiple_of(gap);
+                let read: Vec<usize> = (0..rows.len()).filter(is_read).collect();
+                let some: Vec<u32> = read.iter().map(|&k| rows[k]).collect();
+                let some = Rows::new(rows.side(), some).unwrap();
+                let each = form.readings();
+                let y: Vec<f64> =
+                    read.iter().flat_map(|k| &y[k * each..(k + 1) * each]).copied().collect();
+                let places = Places { read: &read, patterns: rows.len() };
+                let claim = Claim { side_guessed, ..form.into() };
+                let found = read_at(&some, &y, claim, Some(places)).unwrap();
+                let explanation = found.doubts.iter().find_map(|doubt| match *doubt {
+                    Doubt::Form { explanation, .. } | Doubt::Repeated { explanation, .. } => {
+                        Some(explanation)
+                    }
+                    _ => None,
+                });
+                assert_eq!(explanation, Some(expected), "{name}, {form:?}, each {gap}th lost");
+            }
+        }
+    }
+}
+
 #[test]
 fn readings_of_another_sign_are_named_in_every_form() {
     for (name, rows, y) in recordings() {

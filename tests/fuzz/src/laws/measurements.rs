@@ -70,9 +70,9 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "hdf5",
         reads: "an HDF5 file, MATLAB's `.mat` 7.3 among them",
-        readers: &["host/files/src/hdf5.rs"],
+        readers: &["host/files/src/hdf5.rs", "host/files/src/hdf5/lzf.rs"],
         holds: files,
-        seeds: || ["h5py.h5", "level73.mat", "nested.h5"].map(small).to_vec(),
+        seeds: || ["h5py.h5", "level73.mat", "nested.h5", "lzf.h5"].map(small).to_vec(),
         longest: 12_288,
         most_memory: MEMORY,
     },

@@ -1,10 +1,5 @@
 //! Fourier patterns: readings under cosines of each frequency in three or four steps, or the spectrum that was made of
 //! them.
-//!
-//! The pattern of frequency (v, u) in step p of s is `1/2 + cos(2 pi (v r / height + u c / width + p / s)) / 2` on pixel
-//! (r, c). The readings of one frequency give its complex coefficient, without any constant light (Z. Zhang, X. Ma and
-//! J. Zhong, Nat. Commun. 6, 6225 (2015)). A coefficient and that of the opposite frequency are conjugate; each pair gives
-//! two real rows, a cosine and a sine, so that all rows are orthogonal.
 
 use crate::FileError;
 use crate::field::Field;
@@ -17,22 +12,10 @@ use crate::measurement::weighed::{Plain, Which};
 use crate::measurement::{PatternSelection, Selection};
 use crate::plain::MAX_MEMORY_BYTES;
 use nirspi_recon::Size;
+use nirspi_recon::fourier::{Complex, Spectrum, shown_weights};
 use nirspi_recon::words::count_of;
-use std::f64::consts::{SQRT_2, TAU};
 use std::path::Path;
 use std::sync::Arc;
-
-/// A complex number.
-type Complex = (f64, f64);
-
-/// The angle of a frequency at a pixel, in turns.
-fn turns(size: Size, (v, u): (usize, usize), pixel: usize) -> f64 {
-    let (height, width) = (size.height(), size.width());
-    let (row, column) = (pixel / width, pixel % width);
-    // The whole turns are left out before the division, which is then exact enough at any frequency.
-    let down = (v * row % height) as f64 / height as f64;
-    down + (u * column % width) as f64 / width as f64
-}
 
 /// The patterns as they are shown: of each frequency, row by row, all steps.
 pub(super) fn shown(size: Size, steps: usize) -> Result<Patterns, (String, String)> {
@@ -40,24 +23,7 @@ pub(super) fn shown(size: Size, steps: usize) -> Result<Patterns, (String, Strin
     if (count * area * size_of::<f64>()) as u64 > MAX_MEMORY_BYTES {
         return Err((format!("{count} patterns of {size} pixels"), "at most 1 GiB".to_owned()));
     }
-    let mut weights = Vec::with_capacity(count * area);
-    for frequency in 0..area {
-        let frequency = (frequency / size.width(), frequency % size.width());
-        for step in 0..steps {
-            let moved = step as f64 / steps as f64;
-            let weight = |pixel| 0.5 + 0.5 * (TAU * (turns(size, frequency, pixel) + moved)).cos();
-            weights.extend((0..area).map(weight));
-        }
-    }
-    Ok(Patterns { size, count, weights })
-}
-
-/// Coefficients of frequencies side by side: rows `v`, columns `u` from 0 on, as many as were measured.
-struct Spectrum {
-    size: Size,
-    columns: usize,
-    /// `None`: not read.
-    values: Vec<Option<Complex>>,
+    Ok(Patterns { size, count, weights: shown_weights(size, steps) })
 }
 
 /// Reads the readings of Fourier patterns, or a complex spectrum, from a file: coefficients of frequencies
@@ -148,19 +114,15 @@ fn each_of(field: Field) -> Vec<Field> {
 }
 
 /// The measurement of this index, along the first axis.
-fn one_of(mut field: Field, index: Option<usize>) -> Result<Field, (String, String)> {
+fn one_of(field: Field, index: Option<usize>) -> Result<Field, (String, String)> {
     let Some(index) = index else { return Ok(field) };
-    let several = field.shape.first().copied().unwrap_or(1);
-    if field.shape.len() < 2 || index >= several {
-        let found = format!("has shape {:?} for --index {index}", field.shape);
+    let shape = field.shape.clone();
+    let mut all = each_of(field);
+    if shape.len() < 2 || index >= all.len() {
+        let found = format!("has shape {shape:?} for --index {index}");
         return Err((found, "several measurements along the first axis".to_owned()));
     }
-    let each = field.real.len() / several;
-    let part = index * each..(index + 1) * each;
-    field.real = field.real[part.clone()].to_vec();
-    field.imaginary = field.imaginary.map(|imaginary| imaginary[part].to_vec());
-    field.shape.remove(0);
-    Ok(field)
+    Ok(all.swap_remove(index))
 }
 
 /// The size of the image and the columns of the spectrum for this many frequencies.
@@ -249,86 +211,4 @@ fn of_steps(field: &Field, steps: usize, size: Option<Size>) -> Result<Spectrum,
         }
     };
     Ok(Spectrum { size, columns, values: (0..frequencies).map(value).collect() })
-}
-
-/// A row of the matrix: a cosine, or a sine downwards, of a frequency.
-struct Row {
-    frequency: (usize, usize),
-    is_sine: bool,
-    scale: f64,
-}
-
-impl Row {
-    fn weights(&self, size: Size) -> impl Iterator<Item = f64> + '_ {
-        (0..size.area()).map(move |pixel| {
-            let angle = TAU * turns(size, self.frequency, pixel);
-            self.scale * if self.is_sine { -angle.sin() } else { angle.cos() }
-        })
-    }
-}
-
-impl Spectrum {
-    /// Moves the zero frequency from the middle to the beginning, if it stands there: light has no frequency of larger
-    /// amplitude. Returns a note.
-    fn center(&mut self) -> Option<String> {
-        let (height, columns) = (self.size.height(), self.columns);
-        let is_whole = columns == self.size.width();
-        let middle = (height / 2, if is_whole { columns / 2 } else { 0 });
-        let amplitude =
-            |at: usize| self.values[at].map_or(0.0, |(real, imaginary)| real.hypot(imaginary));
-        let at = (0..self.values.len()).max_by(|&a, &b| amplitude(a).total_cmp(&amplitude(b)))?;
-        let (v, u) = (at / columns, at % columns);
-        if (v, u) == (0, 0) {
-            return None;
-        }
-        if (v, u) != middle {
-            return Some(format!(
-                "frequency [{v}, {u}] is larger than the zero frequency: light has no such spectrum"
-            ));
-        }
-        let values = &self.values;
-        let from = |at: usize| {
-            ((at / columns + middle.0) % height) * columns + (at % columns + middle.1) % columns
-        };
-        self.values = (0..values.len()).map(|at| values[from(at)]).collect();
-        Some("the zero frequency is in the middle of the spectrum".to_owned())
-    }
-
-    /// The rows of all coefficients that were read, and their values, all with the same noise.
-    fn rows(&self) -> (Vec<Row>, Vec<f64>) {
-        let (height, width) = (self.size.height(), self.size.width());
-        let read = |v: usize, u: usize| match u < self.columns {
-            true => self.values[v * self.columns + u],
-            false => None,
-        };
-        let (mut rows, mut values) = (Vec::new(), Vec::new());
-        for v in 0..height {
-            for u in 0..width {
-                let frequency = (v, u);
-                let opposite = ((height - v) % height, (width - u) % width);
-                if frequency > opposite {
-                    continue;
-                }
-                let one = read(v, u);
-                let is_own = frequency == opposite;
-                let other = if is_own { None } else { read(opposite.0, opposite.1) };
-                let (value, scale) = match (one, other.map(|(real, imaginary)| (real, -imaginary)))
-                {
-                    // The mean has less noise, so that it counts for more.
-                    (Some(one), Some(other)) => {
-                        (((one.0 + other.0) / 2.0, (one.1 + other.1) / 2.0), SQRT_2)
-                    }
-                    (Some(value), None) | (None, Some(value)) => (value, 1.0),
-                    (None, None) => continue,
-                };
-                rows.push(Row { frequency, is_sine: false, scale });
-                values.push(scale * value.0);
-                if !is_own {
-                    rows.push(Row { frequency, is_sine: true, scale });
-                    values.push(scale * value.1);
-                }
-            }
-        }
-        (rows, values)
-    }
 }

@@ -1,4 +1,3 @@
-use super::s_matrix::first_row;
 use super::*;
 use crate::measurement::{PatternSelection, Selection};
 use crate::measurement::{Plain, read_plain};
@@ -164,36 +163,6 @@ fn complex(values: &[(f64, f64)]) -> (tempfile::TempDir, std::path::PathBuf) {
         bytes.extend(imaginary.to_le_bytes());
     });
     file("spectrum.npy", &bytes)
-}
-
-/// A row and its moved copies share a quarter of the ones each: S S^T = (N + 1) / 4 (I + J).
-#[test]
-fn every_order_has_a_row_whose_copies_share_as_many_ones() {
-    let orders: Vec<usize> = (1..700).filter(|&order| first_row(order).is_some()).collect();
-    assert!(
-        [3, 7, 11, 15, 19, 23, 31, 35, 63, 127, 143, 255, 323, 511]
-            .iter()
-            .all(|order| orders.contains(order))
-    );
-    for &order in orders.iter().chain(&[1023, 2047, 4095]) {
-        let row = first_row(order).unwrap();
-        let ones: Vec<usize> = (0..order).filter(|&at| row[at]).collect();
-        assert_eq!((row.len(), ones.len()), (order, order.div_ceil(2)), "{order}");
-        let some = if order < 200 {
-            (1..order).collect()
-        } else {
-            vec![1, 2, 3, order / 3, order / 2, order - 1]
-        };
-        for by in some {
-            let shared = ones.iter().filter(|&at| row[(at + by) % order]).count();
-            assert_eq!(shared, order.div_ceil(4), "order {order} moved by {by}");
-        }
-    }
-    assert_eq!(
-        first_row(7).unwrap(),
-        [true, true, true, false, true, false, false],
-        "Harwit and Sloane"
-    );
 }
 
 #[test]

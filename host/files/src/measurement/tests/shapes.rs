@@ -43,6 +43,52 @@ fn pattern_and_complement_side_by_side_are_pairs() {
     assert_eq!(second.readings, Readings::Pairs(PAIRS.to_vec()));
 }
 
+/// A spectrum without rows is one measurement where its side is said, or where its rows are no sweeps.
+#[test]
+fn a_spectrum_alone_is_known_by_its_side() {
+    let alone = |shape: &str, count: u32, form, side: Option<u64>, index| {
+        let values: Vec<f64> = (0..count).map(|at| f64::from(at * 7 % 13)).collect();
+        let side = side.map(|side| Side::new(side).unwrap());
+        let (form, want) = (Some(form), shown(Order::Natural));
+        let want = Selection { form, side, index, ..want };
+        let found = read_members(&[("spectrum.npy", npy_f64(shape, &values))], &want);
+        let found = found.map_err(|error| line(&error, "lab.npz"))?;
+        Ok::<_, String>((found.h_row.side().pixels(), found.readings.values() == values))
+    };
+    for (shape, count, form) in [
+        ("(8, 8)", 64, Form::Differences),
+        ("(8, 8)", 64, Form::Single),
+        ("(8, 8, 2)", 128, Form::Pairs),
+        ("(1, 8, 8, 1)", 64, Form::Differences),
+    ] {
+        for side in [None, Some(8)] {
+            assert_eq!(alone(shape, count, form, side, None), Ok((8, true)), "{shape} {side:?}");
+        }
+    }
+    for (shape, count, form) in
+        [("(16, 16)", 256, Form::Differences), ("(16, 16, 2)", 512, Form::Pairs)]
+    {
+        assert_eq!(alone(shape, count, form, Some(16), None), Ok((16, true)), "{shape}");
+        // They may be 16 sweeps of 4 x 4, too.
+        let told = alone(shape, count, form, None, None).unwrap_err();
+        let both = "choose one with --index 0..15, or say --side 16 for one spectrum of 16 x 16";
+        assert!(told.contains(both), "{told}");
+        assert_eq!(alone(shape, count, form, None, Some(3)), Ok((4, false)), "{shape}");
+    }
+    // Several spectra are chosen by their index.
+    for (shape, count, side) in [("(3, 8, 8)", 192, None), ("(3, 16, 16)", 768, Some(16))] {
+        let told = alone(shape, count, Form::Single, side, None).unwrap_err();
+        assert!(told.ends_with("choose one with --index 0..2"), "{told}");
+        let (n, _) = alone(shape, count, Form::Single, side, Some(2)).unwrap();
+        assert_eq!(3 * n * n, count as usize, "{shape}");
+    }
+    // No spectrum: halves, other sides.
+    assert!(alone("(8, 8)", 64, Form::Halves, None, None).is_err());
+    assert!(
+        alone("(8, 8)", 64, Form::Single, Some(16), None).unwrap_err().contains("--index 0..7")
+    );
+}
+
 #[test]
 fn two_fields_are_named_together() {
     let [plus, minus] = [0, 1].map(|side| PAIRS.iter().skip(side).step_by(2).copied());
@@ -125,6 +171,16 @@ fn a_pattern_that_was_shown_several_times_has_the_mean_of_its_readings() {
     assert!(several.stack().unwrap().is_none());
     let all: Vec<_> = several.each().unwrap();
     assert_eq!(all[1].readings, Readings::Differential(vec![2.0, 1.0, 1.0]));
+}
+
+/// White references have no row, and are no patterns: there may be more readings than the image has pixels.
+#[test]
+fn rows_below_zero_are_left_out_before_patterns_are_counted() {
+    let rows = npy_i32("(7,)", &[-1, 0, 1, -1, 2, 3, -1]);
+    let d = vec![("d.npy", npy_f64("(7,)", &[99.0, 8.0, 2.0, 99.0, -0.5, 4.0, 99.0]))];
+    let found = of(rows, d, &as_is()).unwrap();
+    assert_eq!((&*found.h_row, found.not_read), (&[0, 1, 2, 3][..], vec![0, 3, 6]));
+    assert_eq!(found.readings, Readings::Differential(vec![8.0, 2.0, -0.5, 4.0]));
 }
 
 #[test]

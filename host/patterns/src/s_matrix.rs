@@ -3,11 +3,8 @@
 //! The first rows are those of M. Harwit and N. J. A. Sloane, *Hadamard Transform Optics* (1979), appendix: quadratic
 //! residues, shift registers and twin primes.
 
-use crate::measurement::patterns::Patterns;
-use nirspi_recon::Size;
-
 /// The greatest order: a matrix of 128 MiB.
-pub(super) const MOST: usize = 4095;
+pub const MOST: usize = 4095;
 
 /// Of each degree from 2 on, the exponents below it of a primitive polynomial over two elements, without 0
 /// (P. H. R. Scholefield, Proc. IEE 107 B, 1960).
@@ -16,7 +13,8 @@ const PRIMITIVE: [&[u32]; 11] =
 
 /// The first row of the matrix of this order, if there is one: a set of (N + 1) / 2 ones of which any two moved copies
 /// share (N + 1) / 4.
-pub(super) fn first_row(order: usize) -> Option<Vec<bool>> {
+#[must_use]
+pub fn first_row(order: usize) -> Option<Vec<bool>> {
     if !(3..=MOST).contains(&order) || order % 4 != 3 {
         return None;
     }
@@ -65,22 +63,37 @@ fn register(bits: u32) -> Vec<bool> {
     sequence
 }
 
-/// The patterns for images of this size; by default the size of this many pixels that is nearest to a square.
-pub(super) fn patterns(order: usize, size: Option<Size>) -> Result<Patterns, (String, String)> {
-    let side = (1..=order.isqrt()).rev().find(|&side| order.is_multiple_of(side)).unwrap_or(1);
-    let size = match size {
-        Some(size) if size.area() == order => size,
-        Some(size) => {
-            let expected =
-                format!("{order} pixels for s-matrix:{order}, such as {side}x{}", order / side);
-            return Err((format!("has {} pixels for {size}", size.area()), expected));
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row and its moved copies share a quarter of the ones each: S S^T = (N + 1) / 4 (I + J).
+    #[test]
+    fn every_order_has_a_row_whose_copies_share_as_many_ones() {
+        let orders: Vec<usize> = (1..700).filter(|&order| first_row(order).is_some()).collect();
+        assert!(
+            [3, 7, 11, 15, 19, 23, 31, 35, 63, 127, 143, 255, 323, 511]
+                .iter()
+                .all(|order| orders.contains(order))
+        );
+        for &order in orders.iter().chain(&[1023, 2047, 4095]) {
+            let row = first_row(order).unwrap();
+            let ones: Vec<usize> = (0..order).filter(|&at| row[at]).collect();
+            assert_eq!((row.len(), ones.len()), (order, order.div_ceil(2)), "{order}");
+            let some = if order < 200 {
+                (1..order).collect()
+            } else {
+                vec![1, 2, 3, order / 3, order / 2, order - 1]
+            };
+            for by in some {
+                let shared = ones.iter().filter(|&at| row[(at + by) % order]).count();
+                assert_eq!(shared, order.div_ceil(4), "order {order} moved by {by}");
+            }
         }
-        None => Size::new(side, order / side).map_err(|error| {
-            (format!("an image of {side} x {}", order / side), error.to_string())
-        })?,
-    };
-    let row = first_row(order).unwrap_or_default();
-    let moved = |by: usize| (0..order).map(move |at| (at + by) % order);
-    let weights = (0..order).flat_map(moved).map(|at| f64::from(u8::from(row[at]))).collect();
-    Ok(Patterns { size, count: order, weights })
+        assert_eq!(
+            first_row(7).unwrap(),
+            [true, true, true, false, true, false, false],
+            "Harwit and Sloane"
+        );
+    }
 }
