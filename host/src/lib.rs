@@ -8,8 +8,7 @@
 //! front pages list their modules. This crate adds, each line using only the lines above it:
 //!
 //! * [`heartbeat`] gives signs of life of long work, [`stage_times`] measures it, [`about`] says what a build
-//!   contains, [`udev`] gives users access to cameras on USB, [`depth_image`] is what a camera's depth sensor
-//!   sees in its image,
+//!   contains, [`depth_image`] is what a camera's depth sensor sees in its image,
 //! * [`picture`] draws, [`scene`] is what a camera looks at,
 //! * [`source`] reads measurements from a file, a recording or a capture, `nirspi-recon` reconstructs
 //!   images, [`imaging`] scales, enhances and judges them and gives warnings,
@@ -29,7 +28,7 @@ pub use nirspi_camera::{
 pub use nirspi_files as files;
 pub use nirspi_files::{boards, causes, clock, identity, provenance};
 #[cfg(not(target_family = "wasm"))]
-pub use nirspi_record::{address, devices};
+pub use nirspi_record::{address, devices, udev};
 pub use nirspi_record::{capture, recording, replay};
 
 pub mod about;
@@ -56,7 +55,6 @@ pub mod settings;
 #[cfg(not(target_family = "wasm"))]
 pub mod source;
 pub mod stage_times;
-pub mod udev;
 
 #[cfg(test)]
 mod testing;

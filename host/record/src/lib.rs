@@ -3,7 +3,8 @@
 //!
 //! * [`recording`] stores a measurement, [`replay`] plays it back as a camera, [`capture`] runs a
 //!   measurement and chooses its calibration,
-//! * [`address`] opens the camera at an address, [`devices`] lists cameras.
+//! * [`address`] opens the camera at an address, [`devices`] lists cameras, [`udev`] gives users access to
+//!   cameras on USB.
 
 #[cfg(not(target_family = "wasm"))]
 pub mod address;
@@ -12,3 +13,5 @@ pub mod capture;
 pub mod devices;
 pub mod recording;
 pub mod replay;
+#[cfg(not(target_family = "wasm"))]
+pub mod udev;

@@ -4,9 +4,9 @@
 //! A file of another program is neither replaced nor removed
 //! (`tests::a_file_of_someone_else_is_left_as_it_is`).
 
-use crate::files::FileError;
-use crate::files::output::keep;
-use crate::files::read_small_text;
+use nirspi_files::FileError;
+use nirspi_files::output::keep;
+use nirspi_files::read_small_text;
 use nirspi_wire::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 use std::fs;
 use std::io;
