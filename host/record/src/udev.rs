@@ -249,7 +249,7 @@ mod tests {
     /// `boards/60-nirspi.rules` is for users who install the rule by hand.
     #[test]
     fn the_rule_is_that_of_the_boards_folder() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../boards").join(RULE_NAME);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../boards").join(RULE_NAME);
         assert_eq!(fs::read_to_string(path).unwrap(), rule(None));
     }
 }
