@@ -137,6 +137,7 @@ impl FileError {
     }
 
     /// A file without a field, which has others.
+    #[cfg(not(target_family = "wasm"))]
     pub(crate) fn missing(
         path: &Path,
         field: &'static str,

@@ -4,7 +4,7 @@ use super::FileError;
 #[cfg(not(target_family = "wasm"))]
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{Read, Seek};
+use std::io::Read;
 use std::path::Path;
 
 /// The first bytes of a NumPy array.
@@ -32,6 +32,7 @@ pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u6
 }
 
 /// Opens a plain file and reads its first bytes; it is then at its first byte again. Every error names the path.
+#[cfg(not(target_family = "wasm"))]
 pub(super) fn open_start(
     path: &Path,
     expected: &'static str,
@@ -40,7 +41,7 @@ pub(super) fn open_start(
     let (mut file, length) = open_file(path, expected)?;
     let mut start = Vec::new();
     let read = file.by_ref().take(most as u64).read_to_end(&mut start);
-    let read = read.and_then(|_| file.rewind());
+    let read = read.and_then(|_| std::io::Seek::rewind(&mut file));
     read.map_err(|error| FileError::io(path, "read", error))?;
     Ok((file, length, start))
 }
