@@ -225,7 +225,7 @@ fn a_damaged_file_is_read_in_part_or_refused_in_one_line() {
     let orders = [None, Some(Order::Natural)];
     for (name, bytes) in all_files() {
         let path = bench.path(&name);
-        let step = (bytes.len() / 150).max(1);
+        let step = (bytes.len() / 60).max(1);
         let cuts = (0..bytes.len()).step_by(step).chain([1, 4, bytes.len() - 1]);
         let cut = cuts.map(|end| bytes[..end].to_vec());
         for damaged in cut.chain(with_nan(&bytes)) {
@@ -260,6 +260,7 @@ fn a_damaged_file_is_read_in_part_or_refused_in_one_line() {
 
 /// The same through the program: a picture and a report, or one line and nothing else.
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn the_program_makes_an_image_of_a_damaged_file_or_nothing() {
     let bench = Bench::new();
     for (name, bytes) in all_files() {
