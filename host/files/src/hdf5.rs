@@ -177,7 +177,7 @@ impl Part {
         known.contains(&size).then_some(Self { offset, dtype })
     }
 
-    /// The numbers in elements of so many bytes.
+    /// The numbers of elements that are `each` bytes long.
     fn numbers(&self, elements: &[u8], each: usize) -> Vec<f64> {
         let Self { offset, dtype } = self;
         let of = |element: &[u8]| element[*offset..offset + dtype.size].to_vec();

@@ -79,7 +79,7 @@ impl From<&CameraIdentity> for Camera {
 pub struct Taken {
     /// Where the readings come from.
     pub origin: Origin,
-    /// The camera; `None` if it is not known, or if there is none.
+    /// The camera; `None` for readings without a camera, or of an unknown one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
     /// The name of the file that held the readings, without its folder.

@@ -57,12 +57,11 @@ pub fn is_contradicted(inconsistency: f32) -> bool {
 }
 
 /// Inconsistency up to which an image that was moved counts as one that agrees: more than the radius, because pixels below 0
-/// and above 1 are cut off after the move. Of 34 images under eleven blurs and two noises, 1.12 to 1.2 gave the same to 0.2 dB.
+/// and above 1 are cut off after the move. 1.12 to 1.2 gave the same images to 0.2 dB.
 const REACHED: f32 = 1.15;
 
-/// Share of the distance from the readings that a move leaves where no image has these readings. With 0.4, letters smeared by
-/// 2 to 8 pixels of motion gained 4.3 dB, those out of focus 1.5 dB, letters and photographs under a Gaussian lost nothing
-/// (0.01 dB); with 0.5 and 0.6 letters gained less.
+/// Share of the distance from the readings that a move leaves where no image has these readings. Letters smeared by motion
+/// gain 3.9 dB, those out of focus 1.1 dB, others nothing (docs/log/quality.md); with 0.5 and 0.6 they gain less.
 const STUCK: f32 = 0.4;
 
 /// Smallest standard deviation assumed for the readings, because the estimated blur is not exact

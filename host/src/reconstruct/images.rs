@@ -41,7 +41,7 @@ impl Images {
         self.to.flush()
     }
 
-    /// Bytes of so many images.
+    /// Number of bytes of `count` images.
     pub(super) fn bytes_of(&self, count: usize) -> u64 {
         4 * (self.size.0 * self.size.1 * count) as u64
     }

@@ -288,6 +288,13 @@ impl<'r> Writing<'r> {
 /// Space for pictures and the beginning of the report.
 const ROOM: u64 = 8 << 20;
 
+/// Number of images whose space the rest of the results needs: pictures, and a report that repeats the reports of all images that
+/// are left. An image has `bytes`, all reports together have `reports`.
+fn given_up(images: usize, bytes: u64, reports: u64) -> usize {
+    let each = bytes + 2 * (reports / (images as u64).max(1));
+    (reports + ROOM).div_ceil(each) as usize
+}
+
 /// The first `whole` images and their reports; of a disk that is full, only as many as leave room for the rest of the results.
 fn those_that_fit(
     images: Images,
@@ -298,12 +305,7 @@ fn those_that_fit(
     let reports = reports.flushed(whole)?;
     let given_up = match full {
         Full::File => 0,
-        // The report repeats the reports of all images that are left.
-        Full::Disk => {
-            let reports = reports.bytes()?;
-            let each = images.bytes_of(1) + 2 * (reports / (whole as u64).max(1));
-            (reports + ROOM).div_ceil(each) as usize
-        }
+        Full::Disk => given_up(whole, images.bytes_of(1), reports.bytes()?),
     };
     match whole.checked_sub(given_up).filter(|&count| count > 0) {
         Some(count) => Ok((images.cut(count)?, reports.first(count)?)),
@@ -337,5 +339,26 @@ impl Origin {
             true => self.taken.clone(),
             false => Taken::of_file(named, self.taken.simulated().filter(|_| self.is_alike)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_given_up_of_a_full_disk_is_enough_for_the_rest() {
+        for (images, bytes, of_report) in
+            [(4096, 4096, 90), (100_000, 64, 300), (9000, 1 << 18, 2000)]
+        {
+            let reports = images as u64 * of_report;
+            let given_up = given_up(images, bytes, reports);
+            let left = images.saturating_sub(given_up) as u64;
+            let freed = (bytes + of_report) * given_up as u64;
+            assert!(freed >= left * of_report + ROOM, "{images} images of {bytes} bytes");
+            assert!(given_up < images, "{given_up} of {images}");
+        }
+        // Few and small images leave no room.
+        assert!(given_up(4096, 64, 4096 * 90) > 4096);
     }
 }

@@ -141,6 +141,9 @@ fn a_full_disk_leaves_the_images_before_it_and_says_how_many() {
     let report = bench.json("out/report.json");
     assert_eq!(report["frames"].as_array().unwrap().len(), before);
     assert!(report["ended"].as_str().unwrap().contains("File too large"), "{report}");
+    // The next run knows the shortened files as its own, and replaces them.
+    bench.run(&[&command[..], &["out"]].concat()).succeeded();
+    assert_eq!(bench.pixels("out/image.npy").len(), count * 256);
     // Where not even the first ones fit, nothing is left.
     bench
         .run_limited("ulimit -f 100", &[&command[..], &["none"]].concat())

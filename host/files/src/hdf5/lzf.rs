@@ -1,4 +1,4 @@
-//! The filter LZF, with which h5py packs what nobody else packs so.
+//! The filter LZF, which h5py alone uses to compress arrays.
 //!
 //! Format: Marc Lehmann, LibLZF 3.6, `lzf_d.c`; h5py's filter 32000, whose third value is the length of a chunk.
 

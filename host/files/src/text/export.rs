@@ -144,7 +144,7 @@ impl Table {
         Some((start..all.lines.len(), table))
     }
 
-    /// The table in these lines; `None` if they are none.
+    /// The table that these lines are; `None` if they are not a table.
     fn of(
         path: &Path,
         all: &Lines<'_>,
