@@ -9,6 +9,9 @@ const MOST: usize = 64;
 /// How many times more readings change between blocks of samples than within them.
 const STEADY: f64 = 5.0;
 
+/// Changes of less than this share of the greatest reading may be rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// Fewest readings that a sweep is left with.
 const FEWEST: usize = 8;
 
@@ -28,12 +31,13 @@ pub(super) fn samples(y: &[f64], whole_sweeps: bool) -> Option<usize> {
         let place = ((chosen.len() as f64 * share) as usize).min(chosen.len().saturating_sub(1));
         *chosen.select_nth_unstable_by(place, f64::total_cmp).1
     };
+    let rounding = ROUNDING * y.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
     // Most blocks differ, and within blocks is noise. Of a number of samples and its multiples, the
     // smallest one has no block twice.
     (2..=MOST).filter(|&each| fits(each)).find(|each| {
         let between = share_of(&|at| (at + 1) % each == 0, 0.4);
         let within = share_of(&|at| (at + 1) % each != 0, 0.9);
-        between > STEADY * within
+        between > rounding.max(STEADY * within)
     })
 }
 

@@ -100,6 +100,20 @@ mod right {
         }
     }
 
+    /// An even scene without noise has differences that differ by rounding alone.
+    #[test]
+    fn rounding_is_not_taken_for_several_samples() {
+        let rows = shown(&Order::Natural, 32);
+        for step in 0..1500 {
+            let drift = f64::from(step) * 4e-4 - 0.3;
+            let y = recorded(&rows, 4, drift, 0.0, Noise::Normal { sigma: 0.0, seed: 1 });
+            let [_, _, _, (form, d)] = in_every_form(&y);
+            assert_eq!(form, Form::Differences);
+            let said = is_silent(&rows, &d, claim(form));
+            assert!(said.is_ok(), "{drift}: {said:?}");
+        }
+    }
+
     #[test]
     fn light_that_flickers_or_steps_is_not_doubted() {
         let rows = shown(&Order::Natural, 32);
