@@ -17,8 +17,8 @@
 //!   programs, `inspect` says what is in a file and how to read it.
 //!
 //! Without its features (`default-features = false`) the library captures, records, calibrates and
-//! reads measurements, without typefaces or networks. The features `enhance` and `pictures` add these;
-//! `gpu` adds the kernels for GPUs. The virtual camera is the crate `nirspi-virtual`, the live page
+//! reads measurements, without typefaces or networks. The feature `pictures` adds typefaces, `enhance` these
+//! and the networks, `gpu` adds the kernels for GPUs. The virtual camera is the crate `nirspi-virtual`, the live page
 //! `nirspi-serve`, updates of a camera `nirspi-update`, how good the camera is `nirspi-eval`.
 
 pub use nirspi_camera::{
@@ -47,7 +47,7 @@ pub mod patterns;
 pub mod picture;
 #[cfg(not(target_family = "wasm"))]
 pub mod problem;
-#[cfg(all(feature = "enhance", feature = "pictures", not(target_family = "wasm")))]
+#[cfg(all(feature = "enhance", not(target_family = "wasm")))]
 pub mod reconstruct;
 #[cfg(feature = "pictures")]
 pub mod scene;

@@ -10,5 +10,5 @@ mod recordings;
 mod replay;
 mod session;
 mod split;
-#[cfg(all(feature = "enhance", feature = "pictures"))]
+#[cfg(feature = "enhance")]
 mod stacks;

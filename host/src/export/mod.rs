@@ -8,11 +8,11 @@
 //! Frames are read some at a time, so memory does not grow with the readings of a recording.
 
 mod arrays;
-#[cfg(all(feature = "enhance", feature = "pictures"))]
+#[cfg(feature = "enhance")]
 mod images;
-#[cfg(all(feature = "enhance", feature = "pictures"))]
+#[cfg(feature = "enhance")]
 mod mcap;
-#[cfg(all(feature = "enhance", feature = "pictures"))]
+#[cfg(feature = "enhance")]
 mod video;
 
 use crate::files::FileError;
@@ -41,10 +41,10 @@ pub enum Format {
     /// A table for spreadsheets.
     Csv,
     /// A recording with images, for viewers of MCAP files.
-    #[cfg(all(feature = "enhance", feature = "pictures"))]
+    #[cfg(feature = "enhance")]
     Mcap,
     /// A video.
-    #[cfg(all(feature = "enhance", feature = "pictures"))]
+    #[cfg(feature = "enhance")]
     Apng,
 }
 
@@ -54,9 +54,9 @@ impl Format {
         Self::Npz,
         Self::Npy,
         Self::Csv,
-        #[cfg(all(feature = "enhance", feature = "pictures"))]
+        #[cfg(feature = "enhance")]
         Self::Mcap,
-        #[cfg(all(feature = "enhance", feature = "pictures"))]
+        #[cfg(feature = "enhance")]
         Self::Apng,
     ];
 
@@ -67,9 +67,9 @@ impl Format {
             Self::Npz => "npz",
             Self::Npy => "npy",
             Self::Csv => "csv",
-            #[cfg(all(feature = "enhance", feature = "pictures"))]
+            #[cfg(feature = "enhance")]
             Self::Mcap => "mcap",
-            #[cfg(all(feature = "enhance", feature = "pictures"))]
+            #[cfg(feature = "enhance")]
             Self::Apng => "apng",
         }
     }
@@ -97,9 +97,9 @@ impl Format {
             Self::Npz => "n, h_row, d (mean of all frames), frames (F, M), sequence, times",
             Self::Npy => "the readings of each frame alone, (F, M)",
             Self::Csv => "n, h_row and d, the mean of all frames, one pattern a line",
-            #[cfg(all(feature = "enhance", feature = "pictures"))]
+            #[cfg(feature = "enhance")]
             Self::Mcap => "the recording with images for Foxglove and Rerun, 30 a second at most",
-            #[cfg(all(feature = "enhance", feature = "pictures"))]
+            #[cfg(feature = "enhance")]
             Self::Apng => "a video of the reconstructed frames",
         }
     }
@@ -195,7 +195,7 @@ pub enum ExportError {
         problem: crate::imaging::EnhanceError,
     },
     /// Images cannot be made.
-    #[cfg(all(feature = "enhance", feature = "pictures"))]
+    #[cfg(feature = "enhance")]
     #[error(transparent)]
     Images(#[from] crate::reconstruct::SolverError),
 }
@@ -223,9 +223,9 @@ pub fn export(
         Format::Npz => arrays::npz(whole, out, existing, provenance).map(|()| 0)?,
         Format::Npy => arrays::npy(whole, out, existing, provenance).map(|()| 0)?,
         Format::Csv => arrays::csv(whole, out, existing, provenance).map(|()| 0)?,
-        #[cfg(all(feature = "enhance", feature = "pictures"))]
+        #[cfg(feature = "enhance")]
         Format::Mcap => mcap::write((whole, input), out, options, provenance)?,
-        #[cfg(all(feature = "enhance", feature = "pictures"))]
+        #[cfg(feature = "enhance")]
         Format::Apng => video::apng((whole, input), out, existing, provenance)?,
     };
     let bytes = std::fs::metadata(out).map_or(0, |file| file.len());
