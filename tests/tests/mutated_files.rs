@@ -167,6 +167,7 @@ fn calibrations() {
         dark_counts: 2048.0,
         step_counts: 8000.0,
         noise_counts: 18.5,
+        tile_sag: 0.0,
     };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("kept.json");

@@ -6,6 +6,7 @@ mod phases;
 mod spread;
 
 use crate::response::Settling;
+use crate::sag;
 use crate::setup::MeasurementSetup;
 pub(crate) use changes::Changes;
 use nirspi_recon::{LeakError, MeasurementError, Measurements, Sweep};
@@ -233,8 +234,8 @@ impl Integrated {
     }
 
     /// Measurements in ADC counts, with their [noise](Self::noise). With the camera's response, the dark level is subtracted from
-    /// single readings, and the leak between slots is corrected unless `keep_leak`. Without the
-    /// response the dark level is estimated.
+    /// single readings, the leak between slots is corrected unless `keep_leak`, and so is the sag of the
+    /// LEDs' supplies. Without the response the dark level is estimated.
     ///
     /// # Errors
     /// [`IntegrateError`] if the sums do not fit the setup, or the response cannot be corrected.
@@ -250,11 +251,13 @@ impl Integrated {
             .map(|settling| settling.leak(setup.clocks_per_pattern, setup.blanked))
             .transpose()?;
         let noise = self.noise(setup);
+        let sag = settling.map_or(0.0, |settling| settling.tile_sag);
         if setup.differential {
             if let Some(leak) = &leak {
                 let sweep = if setup.alternating { Sweep::Alternating } else { Sweep::Repeating };
                 leak.correct_differential(&mut values, sweep);
             }
+            sag::correct(sag, &setup.rows, &mut values);
             let measurements = Measurements::from_differential(&setup.rows, &values)?;
             return with_noise(measurements, noise);
         }
@@ -263,6 +266,7 @@ impl Integrated {
         if let Some(leak) = &leak {
             leak.correct_single(&mut values);
         }
+        sag::correct(sag, &setup.rows, &mut values);
         let mut measurements = Measurements::from_single(&setup.rows, &values)?;
         if dark.is_none() {
             measurements.remove_dark_level();

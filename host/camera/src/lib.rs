@@ -24,6 +24,7 @@ pub mod info;
 pub mod integrate;
 pub mod link;
 pub mod response;
+pub mod sag;
 pub mod selftest;
 pub mod session;
 pub mod setup;

@@ -1,5 +1,6 @@
 //! The response of a camera to a step of its light: latency, settling, and the leak that follows.
 
+use crate::sag;
 use nirspi_recon::{Leak, LeakError};
 use nirspi_wire::ADC_MAX;
 use nirspi_wire::register::LATENCY_MAX;
@@ -27,6 +28,9 @@ pub struct Settling {
     pub step_counts: f64,
     /// Standard deviation of one sample.
     pub noise_counts: f64,
+    /// Share of its light that a tile of LEDs loses while all of them are lit ([`crate::sag`]).
+    #[serde(default)]
+    pub tile_sag: f64,
 }
 
 /// A number that no burst can give.
@@ -110,6 +114,9 @@ impl Settling {
                 return Err(wrong(field, &found, format!("{least} to {counts}")));
             }
         }
+        if !(0.0..=sag::LARGEST).contains(&self.tile_sag) {
+            return Err(wrong("tile_sag", &self.tile_sag, format!("0 to {}", sag::LARGEST)));
+        }
         Ok(())
     }
 }
@@ -126,6 +133,7 @@ mod tests {
             dark_counts: 2048.0,
             step_counts: 8000.0,
             noise_counts: 18.5,
+            tile_sag: 0.0165,
         };
         sound.check().unwrap();
         // A chain without any delay settles at once.
@@ -145,6 +153,10 @@ mod tests {
             ),
             (Settling { step_counts: f64::INFINITY, ..sound.clone() }, "step_counts is inf"),
             (Settling { noise_counts: 1e5, ..sound.clone() }, "noise_counts is 100000"),
+            (
+                Settling { tile_sag: f64::NAN, ..sound.clone() },
+                "tile_sag is NaN, expected 0 to 0.5",
+            ),
         ] {
             let error = changed.check().unwrap_err().to_string();
             assert!(error.contains(words), "{error}, expected {words}");

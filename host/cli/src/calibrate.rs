@@ -135,6 +135,12 @@ fn say(report: &Report, flat_field: Option<impl std::fmt::Display>) -> Result<()
         count_of(settling.response.len(), "clock"),
         settling.step_counts
     ))?;
+    if settling.tile_sag > 0.0 {
+        print::line(format_args!(
+            "a tile of LEDs loses {:.2} % of its light while all of them are lit; images are corrected for it",
+            100.0 * settling.tile_sag
+        ))?;
+    }
     print::line(format_args!("kept in {}", report.file.display()))?;
     if let (Some(summary), Some(flat)) = (flat_field, &report.flat_field) {
         print::line(summary)?;

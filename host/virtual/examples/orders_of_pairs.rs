@@ -95,6 +95,7 @@ fn measured(
         dark_counts: 0.0,
         step_counts: 0.0,
         noise_counts: 0.0,
+        tile_sag: 0.0,
     };
     exact.leak(DWELL, BLANKED)?.correct_single(&mut slots);
     let mut differences = vec![0.0; rows.len()];

@@ -114,6 +114,24 @@ fn a_circuits_camera_gives_the_images_of_ideal_leds() {
     }
 }
 
+/// What the sag of the circuit, and one that is six times as large, take from images.
+#[test]
+fn a_sag_that_was_measured_is_taken_back() {
+    let ideal = Calibrated::new(IDEAL);
+    let shown = Shown { order: Order::ZigZag, sampling: 1.0, alternating: true };
+    // LEDs that sag by a tenth give less light.
+    for (sag, most_db) in [(0.0165, 0.2), (0.1, 0.6)] {
+        let sagging = Calibrated::new(&format!("{IDEAL}\ntile_sag = {sag}"));
+        assert!((sagging.settling.tile_sag / sag - 1.0).abs() < 0.05, "{:?}", sagging.settling);
+        for (name, scene) in scenes() {
+            let (_, lost_db) = loss(&sagging, &ideal, &scene, &shown);
+            println!("{name}, sag {sag}: {lost_db:.2} dB");
+            assert!(lost_db < most_db, "{name}, sag {sag}: {lost_db}");
+        }
+    }
+    assert_eq!(ideal.settling.tile_sag, 0.0);
+}
+
 #[test]
 fn without_alternation_the_corner_is_lost() {
     let (circuit, ideal) = (Calibrated::new(CIRCUIT), Calibrated::new(IDEAL));

@@ -16,6 +16,7 @@
 //! wrong, and most pictures are inverted.
 
 use crate::response::{self, Settling};
+use crate::sag;
 use crate::session::{Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
 use nirspi_files::clock::Instant;
@@ -83,11 +84,14 @@ pub enum CalibrationError {
     NoEdge,
 }
 
-/// The setup for the burst.
-fn burst_setup() -> MeasurementSetup {
+/// The second row in natural order lights half of each tile.
+const _: () = assert!(sag::HALF_OF_EACH_TILE == 1);
+
+/// The setup for a burst of the first so many rows in natural order.
+fn burst_setup(patterns: usize) -> MeasurementSetup {
     MeasurementSetup {
         order: "calibration".to_owned(),
-        rows: Rows::natural(Side::INSTRUMENT).first(1),
+        rows: Rows::natural(Side::INSTRUMENT).first(patterns),
         differential: true,
         alternating: true,
         clocks_per_pattern: SLOT,
@@ -155,7 +159,9 @@ pub fn calibrate(
     session: &mut Session,
     listener: &mut dyn Listener,
 ) -> Result<Settling, CalibrationError> {
-    evaluate(&bursts(session, listener)?)
+    let settling = evaluate(&bursts(session, listener, 1)?)?;
+    let tile_sag = tile_sag(&bursts(session, listener, 2)?, &settling);
+    Ok(Settling { tile_sag, ..settling })
 }
 
 /// As [`calibrate`], with an earlier calibration `known`. If the burst is too dim to show latency
@@ -169,20 +175,22 @@ pub fn calibrate_or(
     listener: &mut dyn Listener,
     known: &Settling,
 ) -> Result<(Settling, Option<CalibrationError>), CalibrationError> {
-    let samples = bursts(session, listener)?;
+    let samples = bursts(session, listener, 1)?;
     Ok(match evaluate(&samples) {
         Ok(settling) => (settling, None),
         Err(problem) => (known.at_levels_of(&samples), Some(problem)),
     })
 }
 
-/// The samples of all bursts, one after another.
+/// The samples of all bursts of so many patterns, one after another.
 fn bursts(
     session: &mut Session,
     listener: &mut dyn Listener,
+    patterns: usize,
 ) -> Result<Vec<f64>, CalibrationError> {
     let expected = usize::from(RAW_SAMPLES_MAX);
-    burst_setup().with_configuration(|c| session.command(request::Configure(c), listener))?;
+    burst_setup(patterns)
+        .with_configuration(|c| session.command(request::Configure(c), listener))?;
     let mut samples = Vec::with_capacity(BURSTS * expected);
     for _ in 0..BURSTS {
         let (samples_of_burst, progressed) = (vec![None; expected], Instant::now());
@@ -272,7 +280,48 @@ fn evaluate(samples: &[f64]) -> Result<Settling, CalibrationError> {
         response.truncate(settled);
     }
     let adc_latency = latency as u8;
-    Ok(Settling { adc_latency, response, dark_counts: low, step_counts, noise_counts })
+    Ok(Settling {
+        adc_latency,
+        response,
+        dark_counts: low,
+        step_counts,
+        noise_counts,
+        tile_sag: 0.0,
+    })
+}
+
+/// The sag of the LEDs' supplies from bursts of two patterns: all LEDs, and half of each tile. Light that settles too
+/// slowly for a slot shows none.
+///
+/// Pattern and complement of both are read within microseconds of each other, so that a lamp that flickers adds the same
+/// to all, and with their lines inverted in every second pair of sweeps, so that the charge of the lines cancels.
+fn tile_sag(samples: &[f64], known: &Settling) -> f64 {
+    let slot = usize::from(SLOT);
+    let settled = known.response.len()..slot;
+    // Sweeps of four slots: pattern first, complement first, and both with all lines inverted.
+    let cycle = 16 * slot;
+    if settled.len() < slot / 4 {
+        return 0.0;
+    }
+    let levels = |burst: &[f64]| {
+        // The first sweep begins from dark and unsettled.
+        let cycles = burst[usize::from(known.adc_latency) + 4 * slot..].chunks_exact(cycle);
+        let (mut sums, mut count) = ([0.0; 4], 0.0);
+        for cycle in cycles {
+            for (at, light) in cycle.chunks_exact(slot).enumerate() {
+                // All LEDs, none, half, the other half; in every second sweep, as in this one, none and the other half first.
+                let is_swapped = at / 4 % 2 == 0;
+                let shown = if is_swapped { at % 4 ^ 1 } else { at % 4 };
+                sums[shown] += light[settled.clone()].iter().sum::<f64>();
+            }
+            count += (cycle.len() / slot / 4 * settled.len()) as f64;
+        }
+        let [all, none, half, rest] = sums.map(|sum| sum / count);
+        (all - none, half + rest - 2.0 * none)
+    };
+    let bursts = samples.chunks_exact(usize::from(RAW_SAMPLES_MAX));
+    let (all, halves): (Vec<f64>, Vec<f64>) = bursts.map(levels).unzip();
+    sag::of_levels(&all, &halves)
 }
 
 /// The median of sorted values.

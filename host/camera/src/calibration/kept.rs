@@ -123,6 +123,7 @@ mod tests {
             dark_counts: 2048.0,
             step_counts: 8000.0,
             noise_counts: 18.5,
+            tile_sag: 0.0165,
         };
         let when = UNIX_EPOCH + Duration::from_secs(1_795_163_400);
         KeptCalibration::new(camera(), settling, vec![Check::told("x", true, "")], when)

@@ -166,6 +166,7 @@ fn a_recording_whose_setup_or_calibration_cannot_be_is_refused() {
         dark_counts: 200.0,
         step_counts: 8000.0,
         noise_counts: 18.5,
+        tile_sag: 0.0,
     };
     crafted(&bench, "sound.mcap", &setup, &settling);
     let reconstruct = |name: &str| bench.run(&["reconstruct", name, "--method", "hadamard"]);

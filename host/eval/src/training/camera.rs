@@ -159,6 +159,7 @@ impl LinearCamera {
             dark_counts: 0.0,
             step_counts: 0.0,
             noise_counts: 0.0,
+            tile_sag: 0.0,
         };
         let weather = |drops: Drops| Weather::new(drops, camera.wavelength_nm, Water::Segelstein);
         Ok(Self {

@@ -90,6 +90,7 @@ fn calibration() -> KeptCalibration {
         dark_counts: 2048.0,
         step_counts: 8000.0,
         noise_counts: 18.5,
+        tile_sag: 0.0,
     };
     KeptCalibration::new(seeds::identity().clone(), settling, Vec::new(), UNIX_EPOCH)
 }
