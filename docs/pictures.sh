@@ -34,7 +34,7 @@ quick() {
     "$nirspi" inspect wing.npz --out ways.png
     cp ways.png "$docs/gallery/ways.png"
     "$nirspi" physics range --out out/range
-    cp out/range/{resolution,snr}.png "$docs/cameras"
+    cp out/range/{resolution,snr,assumptions}.png "$docs/cameras"
     "$nirspi" physics rain --out out/rain
     cp out/rain/extinction_rate.png "$docs/gallery/rain.png"
 }

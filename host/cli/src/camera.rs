@@ -14,7 +14,7 @@ use nirspi_optics::Motion;
 use nirspi_optics::rain::{Air, Rainfall};
 use nirspi_recon::{Order, Sampling};
 use nirspi_virtual::weather::{WeatherError, read_weather};
-use nirspi_virtual::{CameraModel, VirtualOptics, read_camera_model};
+use nirspi_virtual::{CameraModel, SpecularSpot, VirtualOptics, read_camera_model};
 use std::path::Path;
 use std::str::FromStr;
 
@@ -93,6 +93,10 @@ pub struct SceneArgs {
     pub weather: WeatherArgs,
     #[command(flatten)]
     pub motion: MotionArgs,
+    /// A spot of the target, as large as a pixel, that throws the LEDs' light straight back: so many times as bright as
+    /// white paper, such as 50, or 50@8,23 with its row and column
+    #[arg(long, value_name = "TIMES[@ROW,COLUMN]")]
+    pub specular: Option<SpecularSpot>,
     #[command(flatten)]
     pub model: ModelArgs,
     /// Seed of the simulated noise: the same seed gives the same bytes
@@ -214,7 +218,8 @@ impl SceneArgs {
         let (scene, model) = (scene.to_owned(), model.clone());
         let weather = WeatherArgs { weather: None };
         let motion = MotionArgs::default();
-        Self { scene, distance_m: None, rain: Some(Rain::None), weather, motion, model, seed }
+        let (rain, specular) = (Some(Rain::None), None);
+        Self { scene, distance_m: None, rain, weather, motion, specular, model, seed }
     }
 
     /// The weather in front of this camera.
@@ -247,6 +252,12 @@ impl SceneArgs {
         let optics = optics
             .in_air(&air)
             .map_err(|error| Usage(format!("{air} at --distance-m {distance_m}: {error}")))?;
+        let optics = match self.specular {
+            Some(spot) => {
+                optics.with_specular(spot).map_err(|error| Usage(format!("--specular: {error}")))?
+            }
+            None => optics,
+        };
         Ok((map, optics))
     }
 }

@@ -33,7 +33,8 @@ pub struct Args {
     #[command(flatten)]
     model: ModelArgs,
     /// Folder for range.png, exposure.png, range.json, and the finest line (resolution.png) and SNR (snr.png) against
-    /// distance of this camera and the shipped ones
+    /// distance of this camera and the shipped ones, and the SNR of the paper's camera if one assumed constant were another
+    /// (assumptions.png)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -106,7 +107,7 @@ fn say(args: &Args, report: &Report) -> Result<()> {
     }
     if let Some(out) = &args.out {
         print::line(format_args!(
-            "wrote range.png, exposure.png, resolution.png, snr.png and range.json to {}",
+            "wrote range.png, exposure.png, resolution.png, snr.png, assumptions.png and range.json to {}",
             out.display()
         ))?;
     }

@@ -107,7 +107,7 @@ fn pattern_us(camera: &CameraModel) -> f64 {
     f64::from(camera.readout.clocks_per_pattern) * SAMPLE_NS * 1e-3
 }
 
-fn at(camera: &CameraModel, weather: &Weather, distance_m: f64) -> Result<AtDistance> {
+pub(crate) fn at(camera: &CameraModel, weather: &Weather, distance_m: f64) -> Result<AtDistance> {
     let (lens, distance_mm) = (camera.projector(), distance_m * 1e3);
     let exposure_us = pattern_us(camera) * f64::from(camera.readout.sweeps_per_picture);
     let pixel = PixelBudget::new(&camera.instrument(), weather, distance_mm, 1.0, exposure_us)?;
@@ -132,7 +132,7 @@ fn beside(camera: &CameraModel) -> Vec<CameraModel> {
 }
 
 /// Distances of the charts.
-fn along_m() -> impl Iterator<Item = f64> {
+pub(crate) fn along_m() -> impl Iterator<Item = f64> {
     (0..=160).map(|i| 0.2 * 10_f64.powf(f64::from(i) / 160.0))
 }
 

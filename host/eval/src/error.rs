@@ -146,6 +146,7 @@ from_libraries!(
     nirspi_nets::upscale::UpscaleError,
     nirspi_nets::weights::WeightsError,
     nirspi_nets::DepthError,
+    nirspi_optics::CameraModelError,
     nirspi_optics::ReliefError,
     nirspi_optics::SceneError,
     nirspi_optics::ProjectorError,

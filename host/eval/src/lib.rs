@@ -26,6 +26,7 @@
 //! uncertainty of a figure, [`legibility`] reads characters and [`resolution`] measures the finest detail.
 //! [`training`] makes pairs for training networks, of [`characters`] and typefaces.
 
+pub mod assumptions;
 pub mod bench;
 pub mod bootstrap;
 pub mod camera_model;

@@ -1,6 +1,7 @@
 //! The camera's range in rain by physics and by Algorithm 2 as printed, compared with the paper's
 //! Table 2.
 
+use crate::assumptions;
 use crate::camera_model::{distance_axis, resolution_chart, snr_chart};
 use crate::error::{EvalError, Result};
 use nirspi::picture::{Axis, Chart, Figure, Line};
@@ -289,18 +290,19 @@ fn reading(
     Ok(lines)
 }
 
-/// The figures and their names: `range` (the [`charts`]), `exposure`, and `resolution` and `snr` of
-/// this camera beside the shipped ones.
+/// The figures and their names: `range` (the [`charts`]), `exposure`, `resolution` and `snr` of this camera beside
+/// the shipped ones, and `assumptions` of the paper's.
 ///
 /// # Errors
 /// [`EvalError::is_setting`] for a reflectance out of range.
-pub fn figures(settings: &Settings) -> Result<[(&'static str, Figure); 4]> {
+pub fn figures(settings: &Settings) -> Result<[(&'static str, Figure); 5]> {
     let camera = &settings.camera;
     Ok([
         ("range", Figure::column(charts(settings)?)),
         ("exposure", exposure_chart(settings)?.into()),
         ("resolution", resolution_chart(camera)?.into()),
         ("snr", snr_chart(camera)?.into()),
+        ("assumptions", assumptions::chart()?.into()),
     ])
 }
 

@@ -24,6 +24,12 @@ const TILES: usize = SIDE / TILE;
 /// The array in front of one scene. Computes the detected light of line states.
 #[derive(Debug, Clone)]
 pub struct LedArray {
+    /// What the spot of each LED sees, as a share of white, row-major.
+    seen: Vec<f32>,
+    /// Electrons per ADC sample from an LED on a white target.
+    electrons_per_led: f64,
+    /// Electrons per ADC sample from a lit LED that have not seen the target.
+    cover_electrons: f64,
     /// Electrons per ADC sample from each LED when lit, row-major.
     electrons: Vec<f32>,
     /// Light of each LED divided by that of an ideal LED; `None` if all LEDs are ideal.
@@ -108,10 +114,11 @@ impl LedArray {
     /// `electrons_per_led` electrons per ADC sample ([`crate::Budget::electrons_per_led`]).
     #[must_use]
     pub fn new(footprint: &Footprint, electrons_per_led: f64) -> Self {
-        let electrons =
-            footprint.weights().iter().map(|&w| (f64::from(w) * electrons_per_led) as f32);
-        Self {
-            electrons: electrons.collect(),
+        let mut array = Self {
+            seen: footprint.weights().to_vec(),
+            electrons_per_led,
+            cover_electrons: 0.0,
+            electrons: Vec::new(),
             gains: None,
             tile_sag: 0.0,
             lit: Sums::default(),
@@ -120,17 +127,26 @@ impl LedArray {
             before: (0, false),
             steps: Steps::default(),
             held: None,
-        }
+        };
+        array.shine();
+        array
     }
 
     /// The same array with real LEDs. `gains` is the light of each LED divided by that of an ideal
     /// LED, 32 x 32, row-major ([`crate::CameraModel::led_gains`]).
     #[must_use]
     pub fn with_gains(mut self, gains: &[f32]) -> Self {
-        for (electrons, gain) in self.electrons.iter_mut().zip(gains) {
-            *electrons *= gain;
-        }
         self.gains = gains.iter().any(|&gain| gain != 1.0).then(|| gains.to_vec());
+        self.shine();
+        self
+    }
+
+    /// The same array behind a cover glass, which throws back `electrons` electrons per ADC sample of each lit LED
+    /// ([`crate::Budget::cover_electrons_per_led`]).
+    #[must_use]
+    pub fn with_cover(mut self, electrons: f64) -> Self {
+        self.cover_electrons = electrons;
+        self.shine();
         self
     }
 
@@ -146,9 +162,18 @@ impl LedArray {
     /// The same array after a change in front of it. `reflectance` is what each LED's spot now
     /// sees, 32 x 32, row-major.
     pub fn relight(&mut self, reflectance: &[f32], electrons_per_led: f64) {
-        for (electrons, &seen) in self.electrons.iter_mut().zip(reflectance) {
-            *electrons = (f64::from(seen) * electrons_per_led) as f32;
-        }
+        self.seen.clear();
+        self.seen.extend_from_slice(reflectance);
+        self.electrons_per_led = electrons_per_led;
+        self.shine();
+    }
+
+    /// Computes the light of each LED anew.
+    fn shine(&mut self) {
+        let Self { electrons_per_led, cover_electrons, .. } = *self;
+        let light = |&seen: &f32| (f64::from(seen) * electrons_per_led + cover_electrons) as f32;
+        self.electrons.clear();
+        self.electrons.extend(self.seen.iter().map(light));
         for (electrons, gain) in self.electrons.iter_mut().zip(self.gains.iter().flatten()) {
             *electrons *= gain;
         }

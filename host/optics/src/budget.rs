@@ -77,6 +77,9 @@ pub struct BudgetSettings {
     pub detector_na: f64,
     /// Share of the light that the glass from LED to detector transmits.
     pub glass_transmission: f64,
+    /// Light that a cover glass before the camera throws back into the collector, divided by that of a white target in
+    /// the lens's focus.
+    pub cover_veil: f64,
     /// Electrons per photon.
     pub quantum_efficiency: f64,
     /// Time of one ADC sample, in ns.
@@ -111,6 +114,7 @@ impl BudgetSettings {
             ("led_power_mw", self.led_power_mw),
             ("ambient_klx", self.ambient_klx),
             ("filter_width_nm", self.filter_width_nm),
+            ("cover_veil", self.cover_veil),
         ];
         for (name, value) in not_negative {
             ensure(value.is_finite() && value >= 0.0, name, value, "0 or more")?;
@@ -185,6 +189,8 @@ fn ensure(
 pub struct Budget {
     /// From one lit LED whose whole spot falls on a target of reflectance 1.
     pub electrons_per_led: f64,
+    /// From one lit LED by way of the cover glass, without having seen the target: the same at every distance.
+    pub cover_electrons_per_led: f64,
     /// From daylight on a field of reflectance 1.
     pub ambient_electrons_white: f64,
     /// Effective diameter of the collector, in mm: its own diameter, or the diameter that the
@@ -247,8 +253,11 @@ impl Budget {
         let klx = settings.ambient_klx;
         let daylight_w_per_m2 = settings.light.irradiance_w_per_m2(klx, nm, width_nm)?;
         let filtered = settings.filtered_fraction();
+        let electrons_per_led = on_target_w * collected * filtered * settings.electrons_per_watt();
+        let of_focus = (distance_mm / projector.focus_distance_mm).powi(2);
         Ok(Self {
-            electrons_per_led: on_target_w * collected * filtered * settings.electrons_per_watt(),
+            electrons_per_led,
+            cover_electrons_per_led: settings.cover_veil * electrons_per_led * of_focus,
             ambient_electrons_white: daylight_w_per_m2 / PI
                 * area_m2
                 * field_sr
@@ -283,11 +292,12 @@ impl Budget {
         self.ambient_electrons_white * mean_reflectance
     }
 
-    /// The brightest possible light: all LEDs and daylight on a white target, in electrons per
-    /// sample.
+    /// The brightest possible light: all LEDs and daylight on a white target, and the cover glass, in
+    /// electrons per sample.
     #[must_use]
     pub fn brightest_electrons(&self) -> f64 {
-        self.electrons_per_led * LEDS as f64 + self.ambient_electrons_white
+        let of_a_led = self.electrons_per_led + self.cover_electrons_per_led;
+        of_a_led * LEDS as f64 + self.ambient_electrons_white
     }
 }
 
@@ -308,6 +318,18 @@ mod tests {
         let (near, far) = (at(300.0, Default::default()), at(900.0, Default::default()));
         assert_close(near.electrons_per_led, 9.0 * far.electrons_per_led);
         assert_close(near.ambient_electrons_white, far.ambient_electrons_white);
+    }
+
+    #[test]
+    fn the_veil_of_a_cover_glass_is_the_same_at_every_distance() {
+        let veiled =
+            |distance_mm| at(distance_mm, BudgetSettings { cover_veil: 0.2, ..Default::default() });
+        let (focus, far) = (veiled(Projector::default().focus_distance_mm), veiled(900.0));
+        assert_close(focus.cover_electrons_per_led, 0.2 * focus.electrons_per_led);
+        assert_close(far.cover_electrons_per_led, focus.cover_electrons_per_led);
+        let without = at(900.0, Default::default()).brightest_electrons();
+        let more = far.brightest_electrons() - without;
+        assert_close(more, 1024.0 * far.cover_electrons_per_led);
     }
 
     #[test]
@@ -391,6 +413,7 @@ mod tests {
             ("glass_transmission", BudgetSettings { glass_transmission: 2.0, ..default }),
             ("quantum_efficiency", BudgetSettings { quantum_efficiency: 0.0, ..default }),
             ("sample_ns", BudgetSettings { sample_ns: f64::INFINITY, ..default }),
+            ("cover_veil", BudgetSettings { cover_veil: -0.1, ..default }),
             ("ambient_klx", BudgetSettings { ambient_klx: f64::NAN, ..default }),
             ("filter_width_nm", BudgetSettings { filter_width_nm: -1.0, ..default }),
         ];

@@ -68,4 +68,4 @@ pub use instrument::{LEDS, SIDE, WAVELENGTH_NM};
 pub use motion::{Motion, MotionError, MovingTarget, Pose};
 pub use projector::{Footprint, Projector, ProjectorError};
 pub use relief::{Relief, ReliefError};
-pub use scene::{Scene, SceneError};
+pub use scene::{Scene, SceneError, Specular};

@@ -111,7 +111,8 @@ impl MovingTarget {
         let sharp = SharpGrid::new(scene, step_mm, emitter_mm, side + 2 * margin);
         let points = (0..side * side).map(|at| (at / side + margin, at % side + margin));
         let blurred = points
-            .map(|(row, column)| sharp.mean_over_disc(row, column, radius).clamp(0.0, 1.0) as f32)
+            .map(|(row, column)| sharp.mean_over_disc(row, column, radius))
+            .map(|mean| mean.clamp(0.0, scene.brightest()) as f32)
             .collect();
         let (sin, cos) = motion.direction_deg.to_radians().sin_cos();
         let along = sin.abs() + cos.abs();

@@ -128,7 +128,8 @@ impl PixelBudget {
         let signal_electrons = dry.electrons_per_led * reflectance * rain_out * rain_back;
         let backscatter_electrons = dry.electrons_per_led * veil.backscatter;
         let lit = LEDS as f64 / 2.0;
-        let pattern_electrons = lit * (signal_electrons + backscatter_electrons);
+        let pattern_electrons =
+            lit * (signal_electrons + backscatter_electrons + dry.cover_electrons_per_led);
         let daylight_electrons = dry.ambient_electrons_white * reflectance * rain_back;
         let airlight_electrons = dry.ambient_electrons_white * veil.airlight;
         let light = pattern_electrons + daylight_electrons + airlight_electrons;

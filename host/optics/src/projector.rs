@@ -193,7 +193,7 @@ impl Projector {
             for column in 0..SIDE {
                 // Differences of running sums may leave the range by the last bit.
                 let mean = sharp.mean_over_disc(at(row), at(column), radius);
-                weights.push(mean.clamp(0.0, 1.0) as f32);
+                weights.push(mean.clamp(0.0, scene.brightest()) as f32);
             }
         }
         Ok(Footprint { weights })
@@ -282,7 +282,7 @@ impl SharpGrid {
     }
 }
 
-/// The mean reflectance in [0, 1] under the spot of each LED, 32 x 32, row-major.
+/// The mean reflectance under the spot of each LED, 32 x 32, row-major: 0 to 1, and more in a specular spot.
 ///
 /// The image that an ideal camera of this resolution would reconstruct.
 #[derive(Debug, Clone, PartialEq)]

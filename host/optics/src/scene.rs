@@ -1,7 +1,7 @@
 //! The target: a square reflectance map on a plane that faces the camera.
 //!
 //! # Invariant
-//! A [`Scene`] is always physical: every reflectance is in [0, 1] and the side is a positive number
+//! A [`Scene`] is always physical: every reflectance is in [0, 1] but in its [`Specular`] spot, and the side is a positive number
 //! of millimetres, because the constructor refuses anything else
 //! (`tests::bad_maps_are_refused_with_the_place_named`). The mean over any rectangle is exact for
 //! the piecewise-constant map (a summed-area table), for any size of the rectangle
@@ -40,6 +40,39 @@ pub enum SceneError {
     /// The side is not a positive finite length.
     #[error("scene: side is {0} mm, expected a positive length")]
     Side(f64),
+    /// A spot that no target can have.
+    #[error("scene: a specular spot {times} times as bright as white, expected {expected}", expected = Specular::EXPECTED)]
+    Specular {
+        /// The brightness given.
+        times: f64,
+    },
+}
+
+/// A square spot of the target that sends the LEDs' light straight back, as a drop, a screw or a varnished edge does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Specular {
+    /// Its brightness, divided by that of white. It is added to that of the map.
+    pub times: f64,
+    /// Its centre on the target plane, to the right of the map's centre.
+    pub x_mm: f64,
+    /// Its centre below that of the map.
+    pub y_mm: f64,
+    /// Its side.
+    pub side_mm: f64,
+}
+
+impl Specular {
+    /// The brightness that a spot may have, in words.
+    pub const EXPECTED: &str = "more than 0 and at most 100000";
+
+    /// Mean brightness that it adds over a square of side `width_mm` centred at (`x_mm`, `y_mm`).
+    fn mean_over_square(&self, x_mm: f64, y_mm: f64, width_mm: f64) -> f64 {
+        let common = |a_mm: f64, b_mm: f64| {
+            let (a, b) = (width_mm / 2.0, self.side_mm / 2.0);
+            ((a_mm + a).min(b_mm + b) - (a_mm - a).max(b_mm - b)).max(0.0)
+        };
+        self.times * common(x_mm, self.x_mm) * common(y_mm, self.y_mm) / (width_mm * width_mm)
+    }
 }
 
 /// A square reflectance map on the target plane, centred on the optical axis.
@@ -49,6 +82,7 @@ pub struct Scene {
     size_px: usize,
     side_mm: f64,
     surround: f32,
+    specular: Option<Specular>,
     /// `(size_px + 1)^2` sums of all reflectances above and to the left of a pixel corner.
     summed: Vec<f64>,
 }
@@ -76,7 +110,7 @@ impl Scene {
             });
         }
         let summed = summed_area(&reflectance, size_px);
-        Ok(Self { reflectance, size_px, side_mm, surround: 0.0, summed })
+        Ok(Self { reflectance, size_px, side_mm, surround: 0.0, specular: None, summed })
     }
 
     /// An infinite white sheet with reflectance 1.
@@ -84,7 +118,7 @@ impl Scene {
     pub fn white() -> Self {
         let reflectance = vec![1.0];
         let summed = summed_area(&reflectance, 1);
-        Self { reflectance, size_px: 1, side_mm: 1.0, surround: 1.0, summed }
+        Self { reflectance, size_px: 1, side_mm: 1.0, surround: 1.0, specular: None, summed }
     }
 
     /// The same scene in front of a background of reflectance `surround`.
@@ -99,7 +133,27 @@ impl Scene {
         Ok(self)
     }
 
-    /// Reflectances, row-major, `size_px` x `size_px`.
+    /// The same scene with a specular spot.
+    ///
+    /// # Errors
+    /// [`SceneError::Specular`] for a spot without a positive brightness and size, or brighter than 100 000 times white.
+    pub fn with_specular(mut self, spot: Specular) -> Result<Self, SceneError> {
+        let Specular { times, x_mm, y_mm, side_mm } = spot;
+        let is_placed = (x_mm + y_mm).is_finite() && side_mm.is_finite() && side_mm > 0.0;
+        if !(times > 0.0 && times <= 1e5 && is_placed) {
+            return Err(SceneError::Specular { times });
+        }
+        self.specular = Some(spot);
+        Ok(self)
+    }
+
+    /// The largest mean over any square: 1, or that of the specular spot on white.
+    #[must_use]
+    pub fn brightest(&self) -> f64 {
+        1.0 + self.specular.map_or(0.0, |spot| spot.times)
+    }
+
+    /// Reflectances, row-major, `size_px` x `size_px`, without the specular spot.
     #[must_use]
     pub fn reflectance(&self) -> &[f32] {
         &self.reflectance
@@ -142,7 +196,8 @@ impl Scene {
             - self.integral_to(right, top);
         let covered_px2 = (right - left) * (bottom - top);
         let area_px2 = 4.0 * half_px * half_px;
-        (inside + f64::from(self.surround) * (area_px2 - covered_px2)) / area_px2
+        let diffuse = (inside + f64::from(self.surround) * (area_px2 - covered_px2)) / area_px2;
+        self.specular.map_or(diffuse, |spot| diffuse + spot.mean_over_square(x_mm, y_mm, width_mm))
     }
 
     /// Integral of the map over [0, x] x [0, y], in pixels, for x and y in [0, `size_px`].
@@ -207,5 +262,34 @@ mod tests {
         // half a pixel of 0.5 and half outside
         close(scene.mean_over_square(-1.0, 0.5, 1.0), 0.75);
         close(scene.mean_over_square(50.0, 0.0, 1.0), 1.0);
+    }
+    #[test]
+    fn a_specular_spot_adds_its_light_where_it_lies() {
+        let grey = Scene::white().with_surround(0.5).unwrap();
+        let spot = Specular { times: 20.0, x_mm: 3.0, y_mm: -1.0, side_mm: 2.0 };
+        let shining = grey.clone().with_specular(spot).unwrap();
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} against {b}");
+        close(
+            shining.mean_over_square(3.0, -1.0, 0.5),
+            grey.mean_over_square(3.0, -1.0, 0.5) + 20.0,
+        );
+        // A quarter of the square.
+        close(shining.mean_over_square(4.0, 0.0, 2.0), grey.mean_over_square(4.0, 0.0, 2.0) + 5.0);
+        close(
+            shining.mean_over_square(3.0, -1.0, 4.0),
+            grey.mean_over_square(3.0, -1.0, 4.0) + 5.0,
+        );
+        close(shining.mean_over_square(-3.0, 1.0, 2.0), 0.5);
+        assert_eq!((grey.brightest(), shining.brightest()), (1.0, 21.0));
+        for bad in [
+            Specular { times: 0.0, ..spot },
+            Specular { times: f64::NAN, ..spot },
+            Specular { times: 1e6, ..spot },
+            Specular { side_mm: 0.0, ..spot },
+            Specular { x_mm: f64::INFINITY, ..spot },
+        ] {
+            let error = grey.clone().with_specular(bad).unwrap_err();
+            assert!(matches!(error, SceneError::Specular { .. }), "{error}");
+        }
     }
 }

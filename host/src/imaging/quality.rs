@@ -115,11 +115,18 @@ const FLAT: &str = "the scene is flat: a fit of gain and offset would make every
 const EQUAL: &str = "the image equals the scene: its PSNR has no bound";
 
 /// Scores `image` against `scene` of the same size, in `[0, 1]`. PSNR and SSIM are of the image
-/// after the gain and offset of least squares, clamped to `[0, 1]`.
+/// after the gain and offset of least squares, clamped to `[0, 1]`. Of a scene with a spot brighter than white, both are
+/// scored as a picture shows them, white at most; the image is then in shares of white.
 ///
 /// # Errors
 /// [`MetricError`] if the sizes differ, or a value is NaN or infinite.
 pub fn score(image: &Image, scene: &[f32]) -> Result<Quality, MetricError> {
+    if scene.iter().any(|&value| value > 1.0 && value.is_finite()) {
+        let shown =
+            |values: &[f32]| values.iter().map(|&v| if v > 1.0 { 1.0 } else { v }).collect();
+        let scene: Vec<f32> = shown(scene);
+        return score(&Image::new(image.side(), shown(image.pixels())), &scene);
+    }
     let (side, pixels) = (image.side().pixels(), image.pixels());
     let correlation = match metrics::correlation(scene, pixels, side, side) {
         Err(MetricError::Flat { .. }) => None,

@@ -24,6 +24,7 @@ mod panels;
 mod precomputed;
 mod server;
 mod shot;
+mod specular;
 mod stages;
 mod tunnel;
 pub mod weather;
@@ -41,6 +42,7 @@ pub use shot::{
     Shot, ShotError, calibrate_against_white, flat_field_against_white, shoot,
     white_level_at_target,
 };
+pub use specular::{SpecularSpot, SpecularSpotError};
 pub use stages::{Stages, StagesError, StagesReport, enhance_stages};
 pub use tunnel::serve_tunnel;
 

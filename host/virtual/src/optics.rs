@@ -1,6 +1,6 @@
 //! The optics of the virtual camera: scene, projector, photon budget, receiver.
 
-use super::{Front, OpticalFpga, VirtualCamera};
+use super::{Front, OpticalFpga, SpecularSpot, SpecularSpotError, VirtualCamera};
 use nirspi::scene::SceneMap;
 use nirspi::setup::MeasurementSetup;
 use nirspi_optics::camera::{canonical, fnv1a};
@@ -51,6 +51,9 @@ pub enum VirtualOpticsError {
     /// The weather is out of range.
     #[error(transparent)]
     Rain(#[from] RainError),
+    /// The array has no pixel where a specular spot should be.
+    #[error(transparent)]
+    Specular(#[from] SpecularSpotError),
     /// Gateware and protocol support one wavelength only.
     #[error(
         "wavelength_nm is {0}, expected {expected} for a virtual camera: its protocol knows no other; \
@@ -200,6 +203,18 @@ impl VirtualOptics {
         format!("virtual-{seed}-{:08x}", fnv1a(this.as_bytes()))
     }
 
+    /// Puts a specular spot on the target. Daylight comes from one direction, which the spot does not send to the camera: set
+    /// weather before.
+    ///
+    /// # Errors
+    /// [`VirtualOpticsError`] for a brightness or a place out of range.
+    pub fn with_specular(mut self, spot: SpecularSpot) -> Result<Self, VirtualOpticsError> {
+        let spot = spot.of_field(self.field_mm())?;
+        self.scene = self.scene.with_specular(spot)?;
+        self.footprint = self.camera.projector().footprint(&self.scene, self.distance_mm)?;
+        Ok(self)
+    }
+
     /// Sets the target in motion. White sheets stay where they are.
     ///
     /// # Errors
@@ -319,7 +334,8 @@ impl VirtualOptics {
         let mean = |i| {
             let (x_mm, y_mm) = (at_mm(i % pixels), at_mm(i / pixels));
             // Differences of running sums may leave the range by the last bit.
-            self.scene.mean_over_square(x_mm, y_mm, pitch_mm).clamp(0.0, 1.0) as f32
+            let mean = self.scene.mean_over_square(x_mm, y_mm, pitch_mm);
+            mean.clamp(0.0, self.scene.brightest()) as f32
         };
         (0..pixels * pixels).map(mean).collect()
     }
@@ -368,6 +384,7 @@ impl VirtualOptics {
     pub fn led_array(&self) -> LedArray {
         LedArray::new(&self.footprint, self.budget.electrons_per_led)
             .with_gains(&self.camera.led_gains())
+            .with_cover(self.budget.cover_electrons_per_led)
             .with_tile_sag(self.camera.leds.tile_sag)
     }
 
@@ -434,6 +451,7 @@ mod tests {
             "[leds]\nfall_ns = 16",
             "[leds]\ntile_sag = 0.01",
             "[leds]\nline_crosstalk_ff = 1",
+            "[collector]\ncover_veil = 0.1",
             "[detector]\ndiameter_mm = 0.3",
             "basis = \"one-metre\"",
         ] {

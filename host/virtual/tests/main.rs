@@ -7,3 +7,4 @@ mod edges;
 mod flat_field;
 mod moving;
 mod selftest;
+mod stray;

@@ -112,7 +112,7 @@ fn resolution_and_snr_against_distance_are_drawn() {
     let range = ["physics", "range", "--camera-model", "one-metre", "--out", "range"];
     let said = bench.run(&range).succeeded().stdout;
     assert!(said.contains("camera one-metre"), "{said}");
-    for name in ["range.png", "resolution.png", "snr.png", "range.json"] {
+    for name in ["range.png", "resolution.png", "snr.png", "assumptions.png", "range.json"] {
         assert!(bench.path(&format!("range/{name}")).exists(), "{name}");
     }
 }

@@ -174,3 +174,28 @@ fn a_target_that_moves_is_simulated_and_its_smear_is_said() {
     let fast = ["capture", "--camera", "virtual", "--target-speed", "200", "--frames", "1"];
     bench.run(&fast).failed(2, &["target speed in m/s is 200, expected 0 to 100"]);
 }
+
+/// One pixel of the target is a mirror. The pixels around it keep what they see.
+#[test]
+fn a_specular_spot_shines_in_its_pixel_alone() {
+    let bench = Bench::new();
+    let image = |name: &str, spot: &[&str]| {
+        let all = ["capture", "--camera", "virtual", "--no-calibration", "--adc-latency", "6"];
+        let all = [&all[..], &["--light", "5ms", "--out", name], spot].concat();
+        bench.run(&all).succeeded();
+        let out = format!("{name}.out");
+        bench.run(&["reconstruct", name, "--method", "hadamard", "--out", &out]).succeeded();
+        bench.pixels(&format!("{out}/image.npy"))
+    };
+    let plain = image("plain.mcap", &[]);
+    let shining = image("shining.mcap", &["--specular", "50@3,4"]);
+    let more: Vec<f32> = shining.iter().zip(&plain).map(|(a, b)| a - b).collect();
+    let spot = 3 * 32 + 4;
+    let rest = more.iter().enumerate().filter(|&(at, _)| at != spot);
+    let rest = rest.map(|(_, more)| more.abs()).fold(0.0, f32::max);
+    assert!(more[spot] > 10.0 * rest && rest > 0.0, "{} {rest}", more[spot]);
+    for (spot, words) in [("bright", "--specular"), ("5@40,0", "row 40, column 0")] {
+        let found = bench.run(&["capture", "--camera", "virtual", "--specular", spot]);
+        found.failed(2, &[words]);
+    }
+}

@@ -145,7 +145,8 @@ impl LinearCamera {
         let distance_mm = projector.focus_distance_mm;
         let sheet = Scene::new(vec![1.0], 1, projector.field_mm(distance_mm))?;
         let optics = VirtualOptics::of(camera, sheet, distance_mm)?;
-        if !optics.chain().is_linear() || camera.leds.tile_sag != 0.0 {
+        let is_veiled = camera.collector.cover_veil != 0.0;
+        if !optics.chain().is_linear() || camera.leds.tile_sag != 0.0 || is_veiled {
             return Err(TrainingCameraError::NotLinear(camera.name.clone()));
         }
         let (clocks, blanked) = timing(camera);

@@ -19,12 +19,13 @@ const BASIS: &str = "basis";
 /// A key for rise and fall of the LEDs together, if they are alike.
 const EDGE: &str = "edge_ns";
 
-/// Keys of `[leds]` that came after the first networks were trained, and the value with which they do nothing.
-const NEW_LED_KEYS: [(&str, f64); 4] = [
-    ("turn_on_delay_ns", 0.0),
-    ("turn_off_delay_ns", 0.0),
-    ("tile_sag", 0.0),
-    ("line_crosstalk_ff", 0.0),
+/// Keys that came after the first networks were trained, with their sections. They do nothing where they are 0.
+const NEW_KEYS: [(&str, &str); 5] = [
+    ("leds", "turn_on_delay_ns"),
+    ("leds", "turn_off_delay_ns"),
+    ("leds", "tile_sag"),
+    ("leds", "line_crosstalk_ff"),
+    ("collector", "cover_veil"),
 ];
 
 /// Time constants of the slower edge that a pattern must last if rise and fall differ
@@ -56,6 +57,7 @@ pub(super) const RANGES: &[(&str, f64, f64)] = &[
     ("collector.aperture_mm", 0.01, 10_000.0),
     ("collector.baseline_mm", 0.001, 10_000.0),
     ("collector.glass_transmission", 0.001, 1.0),
+    ("collector.cover_veil", 0.0, 100.0),
     ("collector.filter_width_nm", 0.1, 1300.0),
     ("detector.diameter_mm", 0.001, 100.0),
     ("detector.numerical_aperture", 0.001, 1.0),
@@ -186,16 +188,19 @@ fn both_edges(leds: &mut Table) -> Result<(), CameraModelError> {
     Ok(())
 }
 
-/// Makes the section `[leds]` as it was before rise and fall could differ, where it says nothing else.
-pub(super) fn fold_new_keys(leds: &mut Table) {
+/// Makes the description as it was before there were [`NEW_KEYS`], and before rise and fall could differ, where it says
+/// nothing else.
+pub(super) fn fold_new_keys(model: &mut Table) {
+    for (section, key) in NEW_KEYS {
+        let Some(Value::Table(section)) = model.get_mut(section) else { continue };
+        if section.get(key).and_then(Value::as_float) == Some(0.0) {
+            section.remove(key);
+        }
+    }
+    let Some(Value::Table(leds)) = model.get_mut("leds") else { return };
     if leds.get("rise_ns") == leds.get("fall_ns") && leds.remove("fall_ns").is_some() {
         let edge = leds.remove("rise_ns");
         leds.extend(edge.map(|edge| (EDGE.to_owned(), edge)));
-    }
-    for (key, unused) in NEW_LED_KEYS {
-        if leds.get(key).and_then(Value::as_float) == Some(unused) {
-            leds.remove(key);
-        }
     }
     if !leds.contains_key("line_crosstalk_ff") {
         leds.remove("line_swing_v");

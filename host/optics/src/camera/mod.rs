@@ -105,6 +105,9 @@ pub struct Collector {
     pub baseline_mm: f64,
     /// Share of the light that all glass from LED to detector transmits.
     pub glass_transmission: f64,
+    /// Light that a cover glass before projector and collector throws back into the collector, as a share of that of a
+    /// white target in the lens's focus.
+    pub cover_veil: f64,
     /// Width of the band-pass filter around the wavelength.
     pub filter_width_nm: f64,
 }
@@ -259,9 +262,7 @@ impl CameraModel {
     #[must_use]
     pub fn key_text(&self) -> String {
         let mut table = file::table_of(self);
-        if let Some(toml::Value::Table(leds)) = table.get_mut("leds") {
-            file::fold_new_keys(leds);
-        }
+        file::fold_new_keys(&mut table);
         canonical(&table)
     }
 

@@ -61,6 +61,7 @@ impl CameraModel {
             detector_diameter_mm: self.detector.diameter_mm,
             detector_na: self.detector.numerical_aperture,
             glass_transmission: self.collector.glass_transmission,
+            cover_veil: self.collector.cover_veil,
             quantum_efficiency: self.quantum_efficiency(),
             sample_ns: SAMPLE_NS,
             light: self.light.source,
