@@ -91,10 +91,11 @@ pub enum TrainingCameraError {
     /// The scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Light that is not linear in the patterns.
+    /// Light that is not linear in the patterns, or that has not seen the target.
     #[error(
         "camera {0}: networks are trained with a camera that is linear in its patterns, expected leds.rise_ns equal \
-         to leds.fall_ns, equal turn-on and turn-off delays, and 0 for leds.tile_sag and leds.line_crosstalk_ff"
+         to leds.fall_ns, equal turn-on and turn-off delays, and 0 for leds.tile_sag, leds.line_crosstalk_ff and \
+         collector.cover_veil"
     )]
     NotLinear(String),
     /// Rain.

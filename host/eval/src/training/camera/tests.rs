@@ -44,9 +44,14 @@ fn mean_and_deviation(a: &[f32], b: &[f32]) -> (f64, f64) {
 
 #[test]
 fn a_camera_that_is_not_linear_in_its_patterns_is_refused() {
-    for key in ["fall_ns = 16", "turn_on_delay_ns = 1", "tile_sag = 0.01", "line_crosstalk_ff = 1"]
-    {
-        let camera = CameraModel::parse(&format!("[leds]\n{key}")).unwrap();
+    for key in [
+        "leds.fall_ns = 16",
+        "leds.turn_on_delay_ns = 1",
+        "leds.tile_sag = 0.01",
+        "leds.line_crosstalk_ff = 1",
+        "collector.cover_veil = 0.1",
+    ] {
+        let camera = CameraModel::parse(key).unwrap();
         let refused = LinearCamera::new(&camera, 1).map(|_| ()).unwrap_err();
         assert!(matches!(refused, TrainingCameraError::NotLinear(_)), "{key}: {refused}");
         assert!(!refused.to_string().contains('\n'), "{refused}");
