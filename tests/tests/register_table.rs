@@ -27,7 +27,7 @@ fn words(source: &str) -> Vec<(String, String)> {
             said = format!("{said} {words}");
         } else {
             let name = line.split_once(' ').unwrap().0.to_owned();
-            let plain = said.trim().replace("[`", "`").replace("`]", "`");
+            let plain = said.trim().replace("[`", "`").replace("`]", "`").replace('|', "\\|");
             found.push((name, plain));
             said.clear();
         }
@@ -54,7 +54,7 @@ fn page(source: &str) -> String {
     writeln!(
         page,
         "\nThe order table begins at 0x{ORDER_TABLE:04X}: 1024 entries of 10 bits, read and written. \
-         A command\nreads as 0, and a written 1 acts once."
+         A command reads as 0,\nand a written 1 acts once."
     )
     .unwrap();
     page
