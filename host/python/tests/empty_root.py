@@ -15,7 +15,7 @@ import tempfile
 import venv
 
 # Libraries that every manylinux wheel may use. Python brings the others of its own.
-MANYLINUX = ("libgcc_s.so.1", "libstdc++.so.6", "libm.so.6")
+MANYLINUX = ("libdl.so.2", "libgcc_s.so.1", "libm.so.6", "libpthread.so.0", "librt.so.1", "libstdc++.so.6")
 
 SCRIPT = """
 import numpy as np
