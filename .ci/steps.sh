@@ -344,6 +344,19 @@ step_python() {
         "$bin/python" -m mypy.stubtest nirspi._nirspi
         "$bin/python" -X dev -m pytest --ignore tests/peers --ignore tests/cluster
     )
+    in_empty_root
+}
+
+# The wheel and the program where nothing is installed. All of the wheel is built already.
+in_empty_root() {
+    if [ "$(uname)" != Linux ]; then
+        echo "skipped: the wheel in an empty root, not Linux"
+        return
+    fi
+    CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo \
+        target/python/bin/pip wheel --quiet --no-deps --wheel-dir "$out/wheel" ./host/python
+    ls -l "$out/wheel"
+    target/python/bin/python host/python/tests/empty_root.py "$out"/wheel/*.whl target/release/nirspi
 }
 
 step_python_peers() {

@@ -11,6 +11,15 @@ fi
 name=$1
 shift
 fact "$name" target >/dev/null
+if [ "$(fact "$name" kind)" = emulated ]; then
+    # Where install-qemu.sh has unpacked it.
+    PATH=$PATH:$boards_folder/../target/qemu
+    if ! command -v qemu-system-arm >/dev/null; then
+        echo "qemu-system-arm is not on the PATH: bash boards/$name/install-qemu.sh gets it" >&2
+        exit 1
+    fi
+    echo "the camera of $name will be at tcp:127.0.0.1:1550, its FPGA's bus at 1551; Ctrl-C ends it" >&2
+fi
 cd "$boards_folder/$name"
 # As build.sh builds it, so that neither compiles again what the other has.
 CARGO_ENCODED_RUSTFLAGS=$(same_bytes)

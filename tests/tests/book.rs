@@ -201,6 +201,20 @@ fn a_broken_link_is_found_and_a_link_in_code_is_none() {
     assert!(anchors(page).is_empty());
 }
 
+#[test]
+fn the_page_of_camera_descriptions_has_every_table_of_a_description() {
+    let tables = |text: &str, is_row: fn(&str) -> Option<&str>| -> BTreeSet<String> {
+        text.lines()
+            .filter_map(is_row)
+            .map(|row| row.split(']').next().unwrap().to_owned())
+            .collect()
+    };
+    let of_page =
+        tables(&read(&root().join("docs/camera-description.md")), |line| line.strip_prefix("| `["));
+    let paper = read(&root().join("host/optics/cameras/paper.toml"));
+    assert_eq!(of_page, tables(&paper, |line| line.strip_prefix('[')));
+}
+
 /// Pictures that no command of `docs/pictures.sh` makes: those of a browser.
 const OF_A_BROWSER: [&str; 2] = ["browser.png", "serve.png"];
 /// Width of a figure for paper, 178 mm or 85 mm at 300 dpi.

@@ -26,7 +26,7 @@ const SIGNIFICANT: f64 = 3.0;
 /// number of bits, with the LED's row in the high half of `place` and its column in the low half.
 fn lights_whole_tiles(row: u32, side: u32) -> bool {
     let within = TILE.min(side) - 1;
-    row & (within * side | within) == 0
+    row & ((within * side) | within) == 0
 }
 
 /// A row that lights half of each tile: every second column.
@@ -54,11 +54,13 @@ pub(crate) fn of_levels(all: &[f64], halves: &[f64]) -> f64 {
     let (light, more_light) = (mean(all), mean(&more));
     let variance = more.iter().map(|m| (m - more_light).powi(2)).sum::<f64>() / (count - 1.0);
     let error = (variance / count).sqrt();
-    if light <= 0.0 || !(more_light > SIGNIFICANT * error) {
-        return 0.0;
+    // NaN is not significant either.
+    if light > 0.0 && more_light > SIGNIFICANT * error {
+        // With L for the light of a stiff supply: light = L (1 - sag), more_light = L sag / 2.
+        (2.0 * more_light / (light + 2.0 * more_light)).min(LARGEST)
+    } else {
+        0.0
     }
-    // With L for the light of a stiff supply: light = L (1 - sag), more_light = L sag / 2.
-    (2.0 * more_light / (light + 2.0 * more_light)).min(LARGEST)
 }
 
 #[cfg(test)]

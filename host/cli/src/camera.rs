@@ -268,8 +268,7 @@ impl SceneArgs {
 pub struct SetupArgs {
     #[arg(long, value_name = "ORDER", default_value = "cake-cutting", help = order_help())]
     pub order: String,
-    /// Share of all patterns to show, the first of the order: 0.3 or 30% [default: 0.5; 1 for capture, because a recording
-    /// can be reconstructed from fewer patterns later]
+    /// Share of all patterns to show, the first of the order: 0.3 or 30% [default: 0.5]
     #[arg(long, value_name = "SHARE")]
     pub sampling: Option<Sampling>,
     /// Sweeps summed into one frame [default: so many that a frame takes about as long as one sweep of all patterns; with --light,

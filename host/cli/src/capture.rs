@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-/// Record frames of a camera into an MCAP file
+/// Record frames of a camera, each accounted for
 ///
 /// The command uses the ADC latency and the settling that `nirspi camera calibrate` or `nirspi camera selftest` saved for this camera. If
 /// none are saved, the command measures them on the scene first. If the scene is too dark for this, the command ends with an
@@ -39,6 +39,7 @@ use std::sync::atomic::Ordering;
 /// The exit code is 0 only if every frame arrived intact and the camera reports no fault. Otherwise one line says what is
 /// missing, the frames are kept, and the exit code is 1.
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("sampling", |sampling| sampling.help(SAMPLING_HELP).long_help(SAMPLING_HELP)))]
 #[command(after_help = "Examples:\n\
     \x20 nirspi capture --camera usb --frames 1000 --out rec.mcap --picture seen/\n\
     \x20 nirspi capture --camera tcp:127.0.0.1:1550 --frames 1000 --out rec.mcap\n\
@@ -85,6 +86,9 @@ pub struct Args {
     #[command(flatten)]
     pub(super) report: ReportArgs,
 }
+
+const SAMPLING_HELP: &str = "Share of all patterns to show, the first of the order: 0.3 or 30% [default: 1, because a \
+                             recording can be reconstructed from fewer patterns later]";
 
 /// Records the frames of a camera.
 pub fn run(args: &Args) -> Result<ExitCode> {

@@ -26,7 +26,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Show what the camera does, without a camera: the paper's chain on a simulated scene
+/// Show the paper's chain on a simulated scene; no camera is needed
 ///
 /// The chain of the paper: heavy rain between camera and scene, half of the patterns, OMP, fusion with depth, deblurring by a
 /// diffusion network; the plain inverse transform stands beside the result. The light is simulated; the gateware is its
@@ -34,7 +34,7 @@ use std::process::ExitCode;
 /// against a white sheet, and measures a white sheet in place of the scene: every image is in shares of that white, as it is,
 /// with its noise. Scores compare an image with the scene after a fit of gain and offset, which stands beside them; no image
 /// is fitted. The command writes the scene and the image of every stage as PNG and NPY, side_by_side.png (and .svg, .pdf), report.json, and
-/// measurement.npz and frames.npy to try other commands on.
+/// measurement.npz.
 ///
 /// A capture that loses frames ends with exit code 1, and nothing is written.
 #[derive(Debug, clap::Args)]
@@ -264,7 +264,6 @@ fn write(args: &Args, images: &Images, report: &Report) -> Result<()> {
     out.write("raw.npy", &npy::encode(&grid, images.raw.pixels()))?;
     out.write("reconstruction.npy", &npy::encode(&grid, images.image.pixels()))?;
     // The input of `enhance` and `reconstruct`.
-    out.write("frames.npy", &npy::encode(&[1, side, side], images.image.pixels()))?;
     let measurement = args.out.join("measurement.npz");
     let measured = encode_measurement(&measurement, images.measurements, provenance)?;
     out.write("measurement.npz", &measured)?;

@@ -16,8 +16,9 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Enlarge and deblur images, from 32 x 32 to 64 x 64: fusion with depth, then deblurring by a diffusion network
+/// Enlarge and deblur images, from 32 x 32 to 64 x 64
 ///
+/// One network enlarges, with depth maps if there are any; a diffusion network deblurs.
 /// The command reads .npy ((N, 32, 32) or (32, 32), in [0, 1] or 8-bit grey levels), a PNG or JPEG picture, or a folder of
 /// pictures. Blur and noise are estimated from each image. Each result is kept in agreement with its image, and the report
 /// says how well they agree.

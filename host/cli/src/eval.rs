@@ -26,7 +26,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// The paper's tables, ours beside them (ours simulated); what less sampling costs
+/// Make the paper's tables with ours beside them; compare methods
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi eval table2\n\

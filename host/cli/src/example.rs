@@ -9,9 +9,9 @@ use nirspi_virtual::example::Example;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Write an example measurement, made by the virtual camera: n, h_row and d in a .npz file
+/// Write a simulated measurement, to try the next commands on
 ///
-/// The measurement is simulated, and the file says so: its field `simulated` is 1.
+/// The virtual camera makes it: n, h_row and d in a .npz file. The measurement is simulated, and the file says so: its field `simulated` is 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi example wing --out wing.npz")]

@@ -9,7 +9,7 @@ use nirspi::picture::Pictures;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Say what is in a file of readings, and guess the command that reconstructs it
+/// Say what is in a file, and guess the command that reconstructs it
 ///
 /// The command lists the arrays of a .npz, .npy, .mat, .h5, .csv, .txt or .wav file, or what a recording (.mcap) holds. Of a feed it
 /// receives some frames, for some seconds, and says whether the readings fit the header. It then reads the readings in each form and order that options of `nirspi reconstruct` name. It ranks these ways: those that keep the law

@@ -47,8 +47,8 @@ pub struct MethodArgs {
     /// OMP: no negative light. This needs --basis pixel or --dictionary
     #[arg(long, conflicts_with = "as_printed")]
     pub non_negative: bool,
-    /// OMP, and networks that enhance its images: where to compute: auto, cpu, wgpu or cuda. One image is too little work
-    /// for a GPU, so auto is the cpu
+    /// Where OMP, and networks that enhance its images, compute: auto, cpu, wgpu or cuda. auto takes a GPU for a stack of
+    /// images if it is faster; one image is too little work for a GPU
     #[arg(long, value_name = "BACKEND", default_value_t = Backend::Auto)]
     pub backend: Backend,
 }

@@ -10,9 +10,9 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Compare two stacks of images: PSNR, SSIM, and how far apart they are as sets
+/// Compare two stacks of images, one by one and as sets
 ///
-/// A stack is a .npy file of (N, H, W) or (H, W) numbers, a .npz file with `recon`, `image` or `images`, a PNG or JPEG
+/// The command prints PSNR and SSIM of the images, and the distance of the sets. A stack is a .npy file of (N, H, W) or (H, W) numbers, a .npz file with `recon`, `image` or `images`, a PNG or JPEG
 /// picture, a folder of pictures, or a folder that `reconstruct` or `demo` has written. Numbers are in [0, 1]; nothing is
 /// scaled or fitted without --data-range or --align. The Fréchet character distance uses the features of this program's
 /// classifier and needs at least two images of 64 x 64 pixels. --json also gives the figures of each image.

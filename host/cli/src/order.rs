@@ -10,7 +10,7 @@ use nirspi_recon::{Order, Side, Size};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Write the patterns of an order as pictures or as one array, for a DMD or another projector
+/// Write the patterns of an order as pictures or an array, for a DMD
 ///
 /// The command writes a picture for each pattern and each complement, 1 bit a pixel, in the order in which they are shown:
 /// 00000.png, 00001.png and so on. With --npy it writes patterns.npy instead, (M, n, n / 8), 8 pixels a byte, for

@@ -12,7 +12,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Make readings of a trace: samples of a detector that were taken while patterns were shown
+/// Make readings of a trace: samples of an oscilloscope or ADC
 ///
 /// A reading is the mean of the samples of one pattern. A pattern begins where the trigger rises (--trigger), or every K
 /// samples (--samples). The trace is a .npz, .npy, .mat, .h5, .csv, .txt or .wav file with the samples in time order, or numbers

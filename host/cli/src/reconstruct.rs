@@ -16,11 +16,11 @@ use nirspi::imaging::Enhance;
 use nirspi::reconstruct::{OneReport, Pipeline, PipelineError, ResultFolder};
 use nirspi::source::{FirstPatterns, Index, Source};
 use nirspi_recon::{Sampling, Size};
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Make an image from a measurement file (.npz, .npy, .mat, .h5, .csv, .txt, .wav) or a recording (.mcap), or a stack of images
-/// from many
+/// Make an image of a measurement or a recording, or a stack of many
 ///
 /// The command writes image.npy (float32, n x n), image.png and report.json. For complex readings it also writes real.npy
 /// and imaginary.npy. From several files, or from a folder, it makes one stack: image.npy has the images of all measurements,
@@ -34,20 +34,20 @@ use std::process::ExitCode;
     \x20 nirspi reconstruct rec.mcap --index all --warm-start --sampling 0.3 --out video/\n\
     \x20 nirspi reconstruct monday/ friday.npz --sampling 30% --out week/")]
 pub struct Args {
-    /// Share of all n x n patterns to use: 0.3, 30% or 30
+    /// Share of all n x n patterns to use: 0.3 or 30%
     #[arg(long, value_name = "SHARE", default_value_t = Sampling::ALL)]
     sampling: Sampling,
     /// Which patterns --sampling uses: the first of this order, by its name, or of the order in which they were shown
     /// (recorded) [default: the patterns of the lowest sequencies, whatever order was recorded]
     #[arg(long, value_name = "ORDER")]
-    order: Option<String>,
+    first_of: Option<String>,
     #[command(flatten)]
     method: MethodArgs,
     /// Patterns of your own instead of Hadamard rows: fourier:3, fourier:4 or s-matrix:N; a file of any format with one pattern in each row, (M, height * width),
     /// or one picture for each pattern, (M, height, width), or a folder of PNG files. `y` in the input then has one reading
     /// for each pattern, or pattern and complement side by side, (M, 2); --readings names other forms. --strength is relative
     /// to the variance of the readings
-    #[arg(long, visible_alias = "patterns", value_name = "FILE|SET", conflicts_with_all = ["order", "residual", "stop_at_noise", "as_printed", "shown", "side",
+    #[arg(long, value_name = "FILE|SET", conflicts_with_all = ["first_of", "residual", "stop_at_noise", "as_printed", "shown", "side",
           "keep_leak", "warm_start", "complements_first", "inverted", "shift", "sweeps"])]
     matrix: Option<PathBuf>,
     /// With --matrix: height and width of the image, such as 12x15, if patterns are rows and the image is no square
@@ -84,10 +84,10 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let first = match args.order.as_deref() {
+    let first = match args.first_of.as_deref() {
         None => FirstPatterns::LowestSequencies,
         Some("recorded") => FirstPatterns::Recorded,
-        Some(order) => FirstPatterns::Of(parse_order("--order", order)?),
+        Some(order) => FirstPatterns::Of(parse_order("--first-of", order)?),
     };
     args.method.check(args.enhance)?;
     OutputDir::create(&args.out)?.check(["image.npy", "report.json"])?;
@@ -171,8 +171,13 @@ fn say(args: &Args, report: &OneReport) -> Result<()> {
     let enhanced = if args.enhance { ", enhanced.npy, enhanced.png" } else { "" };
     let parts =
         if report.part.is_some() { " (the magnitude), real.npy, imaginary.npy" } else { "" };
+    wrote(format_args!("image.npy, image.png{parts}{enhanced}"), &args.out)
+}
+
+/// Says which files are in the folder.
+fn wrote(files: fmt::Arguments<'_>, out: &Path) -> Result<()> {
+    let out = out.display();
     print::line(format_args!(
-        "wrote image.npy, image.png{parts}{enhanced} and report.json to {}",
-        args.out.display()
+        "wrote {files} and report.json to {out}; pictures also as .svg and .pdf"
     ))
 }

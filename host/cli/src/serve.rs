@@ -24,9 +24,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
-/// Show a camera live on a web page: reconstructed, enlarged and deblurred, with every frame accounted for
+/// Show a camera live on a web page, each frame accounted for
 ///
-/// The command prints the address of the page. docs/live-page.md lists the settings that the page changes. The stop button,
+/// The page shows images reconstructed, enlarged and deblurred. The command prints the address of the page. docs/live-page.md lists the settings that the page changes. The stop button,
 /// Escape and the space bar switch the LEDs off. If the link to the camera is lost, the program opens the camera again. After
 /// a stop or a fault, a person must allow the LEDs to go on, on the page. Only browsers on this machine can open the page,
 /// unless --listen says otherwise; then the page demands a token. Ctrl-C switches the LEDs off and ends the program.
@@ -34,7 +34,7 @@ use std::sync::atomic::Ordering;
 /// With --camera feed:ADDR, the page shows the live readings of any other bench, without LEDs: docs/feeds.md.
 ///
 /// For scripts: GET /api/state, /events, /image.png, /image.npy, /enhanced.png and /enhanced.npy; POST /api/settings, /api/scene,
-/// /api/stop and /api/start. "frames" of the settings is --sum. --backend holds for the networks, too.
+/// /api/stop and /api/start. --backend holds for the networks, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n\
     \x20 nirspi serve\n\
@@ -68,19 +68,19 @@ pub struct Args {
     #[arg(long, value_name = "FILE|DIR|SET")]
     matrix: Option<PathBuf>,
     /// Newest frames to sum into each image; of a feed, 1 if the option is not given
-    #[arg(long, alias = "frames", value_name = "N", default_value_t = 64,
+    #[arg(long, value_name = "N", default_value_t = 64,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES)))]
-    sum: u32,
+    frames: u32,
     #[arg(
         long,
         value_name = "TIME",
-        conflicts_with = "sum",
+        conflicts_with = "frames",
         allow_hyphen_values = true,
-        help = "Light of each image, as a time with its unit: 20ms, 0.2s. --sum and --sweeps follow from it"
+        help = "Light of each image, as a time with its unit: 20ms, 0.2s. --frames and --sweeps follow from it"
     )]
     light: Option<Light>,
     /// Start each image from the images before, moved with the scene. Each frame is then in one image only: a new image
-    /// comes after --sum new frames
+    /// comes after --frames new frames
     #[arg(long)]
     warm_start: bool,
     #[command(flatten)]
@@ -146,7 +146,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let mut setup = args.setup.setup(Sampling::HALF, &args.scene.model)?;
     setup.adc_latency = args.calibration.adc_latency();
-    let mut sum = args.sum;
+    let mut sum = args.frames;
     if let Some(light) = args.light {
         let exposure = args.setup.exposure(light, &setup)?;
         (sum, setup.sweeps) = (exposure.frames, exposure.sweeps);
@@ -207,7 +207,7 @@ fn run_feed(args: &Args, address: &Address) -> Result<ExitCode> {
     print::remark(format_args!("{address}: waiting for the header"));
     let feed = Feed::open(address, || !stop.load(Ordering::Relaxed))?;
     // A bench takes longer for a frame than a camera: each frame is an image.
-    let sum = if feed::is_given("sum") { args.sum } else { 1 };
+    let sum = if feed::is_given("frames") { args.frames } else { 1 };
     let again = (*address != Address::Stdin).then(|| address.clone());
     let (matrix, record_to) = (args.matrix.clone(), args.record_to.clone());
     let source = FeedSource::new(address.to_string(), feed, again, matrix, record_to)

@@ -287,7 +287,9 @@ fn in_words(error: &clap::Error, defaults: &Defaults) -> String {
 fn in_line(message: &str) -> String {
     let mut line = String::new();
     let wanted = |text: &&str| !text.starts_with("Usage:") && !text.starts_with("For more");
-    for part in message.lines().map(str::trim).take_while(wanted).filter(|part| !part.is_empty()) {
+    // A file may begin with one dash. A word with two is an option that the command does not have.
+    let helps = |part: &&str| !part.is_empty() && !part.starts_with("tip: to pass '--");
+    for part in message.lines().map(str::trim).take_while(wanted).filter(helps) {
         match line.chars().last() {
             None => {}
             Some(':') => line.push(' '),

@@ -1,6 +1,6 @@
 //! `nirspi camera setup`: prepares a machine for cameras on USB.
 
-use super::{Usage, print};
+use super::{Usage, print, provenance};
 use anyhow::Result;
 use nirspi::udev::{Group, Installed, RULE_NAME, RULES_DIR, RuleError, check, install, uninstall};
 use std::path::{Path, PathBuf};
@@ -79,8 +79,8 @@ fn explain(error: RuleError) -> anyhow::Error {
         return error.into();
     }
     // The PATH of root may not contain the program.
-    let program = std::env::current_exe().unwrap_or_else(|_| PathBuf::from("nirspi"));
-    anyhow::anyhow!("{}: sudo {} setup", nirspi::causes::in_one_line(&error), program.display())
+    let program = provenance::program().display();
+    anyhow::anyhow!("{}: sudo {program} camera setup", nirspi::causes::in_one_line(&error))
 }
 
 /// Makes udev read its rules again and check the connected devices.

@@ -100,7 +100,7 @@ fn picture(made: &Compared, frame: usize) -> SideBySide {
     chosen.dedup();
     for at in chosen {
         let row = &made.rows[at];
-        let title = format!("{}, {:?}", row.made, row.shown).to_lowercase();
+        let title = format!("{}, {}", row.made, row.shown);
         let caption = format!("{:.2} dB on average", row.psnr_db);
         panels.push(panel(title, made.images[at][frame].pixels(), caption));
     }

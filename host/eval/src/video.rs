@@ -146,6 +146,16 @@ pub enum Shown {
     Turns,
 }
 
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::All => f.write_str("all patterns"),
+            Self::Lowest(per_cent) => write!(f, "lowest {per_cent} %"),
+            Self::Turns => write!(f, "{PER_CENT} % in turn"),
+        }
+    }
+}
+
 impl Shown {
     /// What part of the patterns a frame shows.
     #[must_use]

@@ -419,8 +419,8 @@ pub(crate) mod tests {
         for (arguments, line) in [
             (&["/usr/bin/nirspi", "serve", "--token", "abc"][..], "nirspi serve --token hidden"),
             (
-                &["nirspi", "serve", "--token=abc", "--sum", "8"],
-                "nirspi serve --token=hidden --sum 8",
+                &["nirspi", "serve", "--token=abc", "--frames", "8"],
+                "nirspi serve --token=hidden --frames 8",
             ),
             (
                 &["nirspi", "x", "http://h:1/?token=abc&a=1"],

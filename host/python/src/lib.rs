@@ -19,6 +19,7 @@ mod operator;
 mod optics;
 mod orders;
 mod picture;
+mod program;
 mod reconstruct;
 mod recording;
 mod trace;
@@ -53,6 +54,8 @@ mod _nirspi {
     use crate::orders::{order, orders};
     #[pymodule_export]
     use crate::picture::{picture, sheet};
+    #[pymodule_export]
+    use crate::program::program;
     #[pymodule_export]
     use crate::reconstruct::{bases, methods, reconstruct, reconstruct_file, reconstruct_matrix};
     #[pymodule_export]

@@ -41,7 +41,7 @@ pub fn bases() -> Vec<String> {
 pub(crate) struct Options<'py> {
     method: String,
     sampling: String,
-    order: Option<String>,
+    first_of: Option<String>,
     basis: Option<String>,
     dictionary: Option<PyReadonlyArray1<'py, f32>>,
     sparsity: Option<usize>,
@@ -74,7 +74,7 @@ impl Options<'_> {
     }
 
     fn first(&self) -> PyResult<FirstPatterns> {
-        Ok(match self.order.as_deref() {
+        Ok(match self.first_of.as_deref() {
             None => FirstPatterns::LowestSequencies,
             Some("recorded") => FirstPatterns::Recorded,
             Some(order) => FirstPatterns::Of(named(order)?),

@@ -73,7 +73,7 @@ REFUSED = [
     (lambda: ns.reconstruct(GOOD, sampling=0), "expected more than 0"),
     (lambda: ns.reconstruct(GOOD, sampling=float("nan")), "sampling is nan"),
     (lambda: ns.reconstruct(GOOD, sampling=1.5), "with its sign"),
-    (lambda: ns.reconstruct(GOOD, order="spiral"), "unknown order"),
+    (lambda: ns.reconstruct(GOOD, first_of="spiral"), "unknown order"),
     (lambda: ns.reconstruct(GOOD, sparsity=4), "sparsity belongs to omp"),
     (lambda: ns.reconstruct(GOOD, method="omp", sparsity=0), "at least 1"),
     (

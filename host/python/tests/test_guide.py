@@ -19,7 +19,8 @@ def run(page, folder):
 def test_the_code_for_users_of_other_packages_runs(tmp_path):
     done = run(ROOT / "docs/coming-from.md", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("ran: ") == 2, done.stdout
+    ran, skipped = (done.stdout.count(f"{word}: ") for word in ("ran", "skipped"))
+    assert ran + skipped == 3 and ran >= 2, done.stdout
 
 
 def test_the_code_of_the_guide_runs(tmp_path):

@@ -132,9 +132,9 @@ def test_sampling_is_read_as_people_write_it():
 
 def test_the_order_chooses_the_patterns():
     m = measured(order="natural")
-    used = ns.reconstruct(m, method="hadamard", sampling=0.1, order="recorded").rows
+    used = ns.reconstruct(m, method="hadamard", sampling=0.1, first_of="recorded").rows
     assert used.tolist() == list(range(102))
-    used = ns.reconstruct(m, method="hadamard", sampling=0.1, order="cake-cutting").rows
+    used = ns.reconstruct(m, method="hadamard", sampling=0.1, first_of="cake-cutting").rows
     assert (used == ns.order("cake-cutting", 32)[:102]).all()
 
 

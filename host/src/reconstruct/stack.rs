@@ -67,9 +67,13 @@ impl StackReport {
         let Self { input, n, order, warm, last: (used, method), .. } = self;
         let count = self.frames.len();
         let each = self.stage_ms.of("reconstruct") / count as f64;
+        let warm = match warm {
+            0 => String::new(),
+            warm => format!("{warm} started from the frame before, "),
+        };
         vec![
             format!(
-                "{}: {} of {n} x {n}, order {order}, {warm} started from the frame before, {each:.3} ms a frame",
+                "{}: {} of {n} x {n}, order {order}, {warm}{each:.3} ms a frame",
                 input.display(),
                 count_of(count, "frame"),
             ),

@@ -311,7 +311,7 @@ fn tile_sag(samples: &[f64], known: &Settling) -> f64 {
             for (at, light) in cycle.chunks_exact(slot).enumerate() {
                 // All LEDs, none, half, the other half; in every second sweep, as in this one, none and the other half first.
                 let is_swapped = at / 4 % 2 == 0;
-                let shown = if is_swapped { at % 4 ^ 1 } else { at % 4 };
+                let shown = if is_swapped { (at % 4) ^ 1 } else { at % 4 };
                 sums[shown] += light[settled.clone()].iter().sum::<f64>();
             }
             count += (cycle.len() / slot / 4 * settled.len()) as f64;

@@ -26,7 +26,7 @@ use std::process::ExitCode;
 pub struct Args {
     #[command(flatten)]
     source: SourceArgs,
-    /// Shares of all patterns to compare: 0.3, 30% or 30 each
+    /// Shares of all patterns to compare, each as 0.3 or 30%
     #[arg(long, value_name = "SHARE,...", value_delimiter = ',', default_values = ["0.1", "0.2", "0.3", "0.5"])]
     sampling: Vec<Sampling>,
     /// Orders to compare, by their names; `recorded` is the order in which the patterns were shown

@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 100,
           value_parser = clap::value_parser!(u32).range(2..=100_000))]
     repeats: u32,
-    /// Share of all patterns to show, the first in zig-zag order: 0.3, 30% or 30
+    /// Share of all patterns to show, the first in zig-zag order: 0.3 or 30%
     #[arg(long, value_name = "SHARE", default_value_t = Sampling::HALF)]
     sampling: Sampling,
     /// Seed of the picture

@@ -1,6 +1,6 @@
 //! `nirspi reconstruct --matrix`: measurements by patterns of the user's own.
 
-use super::{Args, print, spinning};
+use super::{Args, print, spinning, wrote};
 use crate::Usage;
 use crate::provenance::made;
 use crate::report::stages;
@@ -43,6 +43,5 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
 fn say(args: &Args, report: &OwnReport) -> Result<()> {
     report.words().iter().try_for_each(print::line)?;
     print::notes(&report.notes())?;
-    let (pictures, out) = (&report.pictures, args.out.display());
-    print::line(format_args!("wrote image.npy, {pictures} and report.json to {out}"))
+    wrote(format_args!("image.npy, {}", report.pictures), &args.out)
 }

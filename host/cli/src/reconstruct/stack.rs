@@ -1,7 +1,7 @@
 //! `nirspi reconstruct --index all`, `nirspi reconstruct FILE FILE ...` and `nirspi reconstruct DIR`: a stack of images, of the
 //! frames of a recording, of the measurements of a file, or of many files.
 
-use super::{Args, failure, print};
+use super::{Args, failure, print, wrote};
 use crate::Usage;
 use crate::progress::Progress;
 use crate::provenance::made;
@@ -121,8 +121,7 @@ fn finish(
             print::note(format_args!("{more} more such lines are in report.json"))?;
         }
         let enhanced = if report.enhanced { ", enhanced.npy" } else { "" };
-        let (pictures, out) = (&report.pictures, args.out.display());
-        print::line(format_args!("wrote image.npy{enhanced}, {pictures} and report.json to {out}"))
+        wrote(format_args!("image.npy{enhanced}, {}", report.pictures), &args.out)
     })?;
     let Some(reason) = &report.ended else { return Ok(code) };
     let images = count_of(report.frames.len(), "image");

@@ -182,7 +182,7 @@ class World:
         # No calibration, few patterns and a cheap method: the work is not what is tested.
         self.server = subprocess.Popen(
             [self.nirspi, "serve", "--listen", f"127.0.0.1:{self.port}", "--camera", f"tcp:127.0.0.1:{self.usb.port}"]
-            + "--no-calibration --adc-latency 7 --method tikhonov --warm-start --sum 200 --strength 1".split()
+            + "--no-calibration --adc-latency 7 --method tikhonov --warm-start --frames 200 --strength 1".split()
             + "--sampling 0.1 --sweeps 250".split(),
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 

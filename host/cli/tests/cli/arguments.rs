@@ -1,58 +1,14 @@
 //! Arguments, help, and where the output goes.
 
 use crate::bench::{Bench, first_bytes, program};
+use crate::help::commands;
 use std::process::{Command, Stdio};
-
-/// Commands that have commands of their own, and those.
-const GROUPS: [(&str, &[&str]); 6] = [
-    (
-        "camera",
-        &[
-            "devices",
-            "info",
-            "selftest",
-            "calibrate",
-            "model",
-            "safety",
-            "setup",
-            "update",
-            "gateware",
-            "flash",
-        ],
-    ),
-    ("recording", &["export", "recover"]),
-    ("physics", &["rain", "budget", "sphere", "rig", "range"]),
-    ("dev", &["pairs", "upscale", "virtual", "completions", "man"]),
-    ("dev bench", &["omp", "enhance", "pipeline"]),
-    ("eval", &["table1", "table2", "table3", "table4", "sampling", "quality"]),
-];
-
-const ALONE: [&str; 11] = [
-    "demo",
-    "example",
-    "serve",
-    "reconstruct",
-    "inspect",
-    "readings",
-    "order",
-    "enhance",
-    "deblur",
-    "metrics",
-    "capture",
-];
-
-/// Every command that does something, as the words that lead to it.
-fn commands() -> Vec<Vec<&'static str>> {
-    let below = GROUPS.iter().flat_map(|(group, names)| {
-        names.iter().map(|name| group.split(' ').chain([*name]).collect::<Vec<_>>())
-    });
-    ALONE.iter().map(|name| vec![*name]).chain(below).collect()
-}
 
 #[test]
 fn a_short_help_shows_at_most_twelve_options() {
     let bench = Bench::new();
-    for command in commands() {
+    for page in commands(&bench) {
+        let command = page.words();
         let help = bench.run(&[&command[..], &["-h"]].concat()).succeeded().stdout;
         let is_option = |line: &&str| line.starts_with("  -") || line.starts_with("      --");
         let options = help.lines().filter(is_option).count();
@@ -63,8 +19,8 @@ fn a_short_help_shows_at_most_twelve_options() {
 #[test]
 fn every_command_explains_itself_with_an_example() {
     let bench = Bench::new();
-    for command in commands() {
-        let help = bench.run(&[&command[..], &["--help"]].concat()).succeeded().stdout;
+    for page in commands(&bench) {
+        let (command, help) = (page.words(), &page.help);
         // The benchmarks and the paper's tables have their examples one level above.
         let above = bench.run(&[&command[..1], &["--help"]].concat()).stdout;
         let example = format!("\n  nirspi {}", command.join(" "));
@@ -83,6 +39,13 @@ fn the_long_version_says_which_build_this_is() {
         let line = said.lines().find(|line| line.trim().starts_with(network)).unwrap();
         assert_eq!(line.split(' ').next_back().unwrap().len(), 64, "{line}");
     }
+}
+
+#[test]
+fn an_option_of_another_command_gets_no_advice_to_pass_it_as_a_file() {
+    let said = Bench::new().run(&["reconstruct", "in.npz", "--order", "zig-zag"]);
+    assert_eq!(said.code, Some(2));
+    assert_eq!(said.stderr.trim_end(), "nirspi: unexpected argument '--order' found");
 }
 
 #[test]
@@ -146,7 +109,7 @@ fn mistakes_in_the_arguments_get_one_line_and_code_2() {
         (&["demo", "--light", "20ms", "--frames", "9"], &["--light", "--frames"]),
         (&["capture", "--light", "20ms", "--frames", "9"], &["--light", "--frames"]),
         (&["capture", "--camera", "replay:r.mcap", "--light", "20ms"], &["--light", "--frames"]),
-        (&["serve", "--light", "20ms", "--sum", "9"], &["--light", "--sum"]),
+        (&["serve", "--light", "20ms", "--frames", "9"], &["--light", "--frames"]),
         (&["serve", "--light", "2s"], &["--light 2s", "at most 1024", "--sweeps"]),
         (&["eval", "table3", "--light", "1s", "--frames", "9"], &["--light", "--frames"]),
         (

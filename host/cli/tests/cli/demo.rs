@@ -3,10 +3,9 @@
 use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
 
-const FILES: [&str; 22] = [
+const FILES: [&str; 21] = [
     "deblurred.npy",
     "deblurred.png",
-    "frames.npy",
     "fused.npy",
     "fused.png",
     "interval.npy",
@@ -114,7 +113,7 @@ fn images_are_shares_of_white_with_their_noise_and_the_fit_stands_beside_the_sco
     }
     // A covered lens reads noise about 0, and half of the noise is below 0.
     bench.run(&["demo", "--scene", "black", "--out", "black"]).succeeded();
-    let dark = bench.pixels("black/frames.npy");
+    let dark = bench.pixels("black/reconstruction.npy");
     let below = dark.iter().filter(|&&value| value < 0.0).count();
     assert!((300..700).contains(&below), "{below} of 1024");
 }

@@ -79,7 +79,7 @@ fn one_recording_gives_one_picture_through_every_door() {
     // The live page of the recording, once it has summed all frames.
     // The page chooses by its first picture, of fewer frames.
     let chosen = made.report.chosen.unwrap();
-    let live = ["--camera", "replay:rec.mcap,100", "--sum", "40", "--method", chosen];
+    let live = ["--camera", "replay:rec.mcap,100", "--frames", "40", "--method", chosen];
     let server = serve(&bench, &live);
     server.state("of all frames", |state| state["picture"]["frames"] == 40);
     let answer = server.get("/image.npy");

@@ -25,6 +25,7 @@ mod exports;
 mod feed;
 mod foreign_devices;
 mod forms;
+mod help;
 mod inspect;
 mod many;
 mod metrics;

@@ -37,7 +37,7 @@ fn sets_of_patterns_have_names() {
         }
     }
     bench.write("steps.txt", steps.as_bytes());
-    let image = ["reconstruct", "steps.txt", "--patterns", "fourier:4", "--size", "6x8"];
+    let image = ["reconstruct", "steps.txt", "--matrix", "fourier:4", "--size", "6x8"];
     let said = bench
         .run(&[&image[..], &["--method", "pseudo-inverse", "--out", "f"]].concat())
         .succeeded()
@@ -149,7 +149,7 @@ fn what_is_wrong_with_patterns_of_the_users_own_is_named() {
     run("dark.npy", &[]).failed(1, &["dark.npy", "rank 0"]);
     write("phi.npy", &[10, 16], &weights);
     run("phi.npy", &["--method", "hadamard"]).failed(2, &["needs Hadamard rows", "pseudo-inverse"]);
-    run("phi.npy", &["--order", "zig-zag"]).failed(2, &["--matrix", "--order"]);
+    run("phi.npy", &["--first-of", "zig-zag"]).failed(2, &["--matrix", "--first-of"]);
     weights[35] = f32::NAN;
     write("phi.npy", &[10, 16], &weights);
     run("phi.npy", &[]).failed(1, &["phi.npy", "is NaN at [2, 3]"]);
@@ -376,7 +376,7 @@ fn all_measurements_of_a_file_become_one_stack() {
         })
         .collect();
     bench.write("steps.csv", steps.as_bytes());
-    let line = ["reconstruct", "steps.csv", "--patterns", "fourier:4", "--size", "4x4"];
+    let line = ["reconstruct", "steps.csv", "--matrix", "fourier:4", "--size", "4x4"];
     bench.run(&[&line[..], &["--index", "all", "--out", "f"]].concat()).succeeded();
     let all = bench.pixels("f/image.npy");
     for (k, image) in all.chunks_exact(16).enumerate() {

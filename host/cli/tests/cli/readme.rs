@@ -186,8 +186,22 @@ fn every_line_of_the_page_about_measurements_runs_as_it_stands() {
 
 #[test]
 #[ignore = "long: .ci/run demo"]
-fn every_line_of_how_it_works_runs_as_it_stands() {
-    assert_eq!(runs_as_it_stands(&Bench::new(), "docs/how-it-works.md").len(), 2);
+fn every_line_of_how_it_works_runs_as_it_stands_and_gives_its_numbers() {
+    let bench = Bench::new();
+    assert_eq!(runs_as_it_stands(&bench, "docs/how-it-works.md").len(), 2);
+    let words = text("docs/how-it-works.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    let db = |run: &str, stage: &str| {
+        let report = bench.json(&format!("out/{run}/report.json"));
+        report.pointer(&format!("{stage}/psnr_db")).unwrap().as_f64().unwrap()
+    };
+    let (plain, sparse) = (db("quarter", "/raw"), db("quarter", "/reconstruction"));
+    let (blot, sharp) = (db("far", "/enhancement/upscaled"), db("far", "/enhancement/deblurred"));
+    for said in [
+        format!("has stripes ({plain:.1} dB), and the sparse image has fewer ({sparse:.1} dB)"),
+        format!("the networks bring {blot:.1} dB to {sharp:.1} dB"),
+    ] {
+        assert!(words.contains(&said), "docs/how-it-works.md does not say: {said}");
+    }
 }
 
 #[test]

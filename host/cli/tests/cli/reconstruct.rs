@@ -53,7 +53,7 @@ fn omp_predicts_what_was_not_measured_better_than_zero_does() {
     bench.write("in.npz", &measured.npz());
     let mut correlations = Vec::new();
     for method in ["omp", "hadamard"] {
-        let part = ["--method", method, "--sampling", "0.4", "--order", "random:1"];
+        let part = ["--method", method, "--sampling", "0.4", "--first-of", "random:1"];
         bench.run(&[&["reconstruct", "in.npz"][..], &part].concat()).succeeded();
         assert_eq!(bench.json("out/report.json")["used"], 410);
         correlations.push(correlation(&bench.pixels("out/image.npy"), &measured.image));
@@ -66,7 +66,8 @@ fn every_method_predicts_a_phantom_better_than_zero_does_and_says_how() {
     let (bench, measured) = (Bench::new(), Measured::new(32));
     bench.write("in.npz", &measured.npz());
     let correlation_by = |arguments: &[&str]| {
-        let part = ["reconstruct", "in.npz", "--sampling", "0.3", "--order", "zig-zag", "--method"];
+        let part =
+            ["reconstruct", "in.npz", "--sampling", "0.3", "--first-of", "zig-zag", "--method"];
         bench.run(&[&part, arguments].concat()).succeeded();
         correlation(&bench.pixels("out/image.npy"), &measured.image)
     };
@@ -136,9 +137,9 @@ fn an_order_of_the_users_own_chooses_which_patterns_count() {
     let recorded: Vec<String> = measured.h_row.iter().map(f32::to_string).collect();
     bench.write("order.txt", recorded.join("\n").as_bytes());
     let half = ["reconstruct", "in.npz", "--sampling", "0.5", "--method", "hadamard"];
-    bench.run(&[&half[..], &["--out", "a", "--order", "recorded"]].concat()).succeeded();
-    bench.run(&[&half[..], &["--out", "b", "--order", "table:order.txt"]].concat()).succeeded();
-    bench.run(&[&half[..], &["--out", "c", "--order", "sequency"]].concat()).succeeded();
+    bench.run(&[&half[..], &["--out", "a", "--first-of", "recorded"]].concat()).succeeded();
+    bench.run(&[&half[..], &["--out", "b", "--first-of", "table:order.txt"]].concat()).succeeded();
+    bench.run(&[&half[..], &["--out", "c", "--first-of", "sequency"]].concat()).succeeded();
     let (a, b, c) =
         (bench.pixels("a/image.npy"), bench.pixels("b/image.npy"), bench.pixels("c/image.npy"));
     assert_eq!(a, b);

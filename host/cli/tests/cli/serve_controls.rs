@@ -189,7 +189,7 @@ fn the_scene_of_a_real_camera_cannot_be_changed() {
 #[test]
 fn images_that_start_from_those_before_are_switched_on_by_an_option_and_off_by_the_page() {
     let bench = Bench::new();
-    let server = serve(&bench, &["--method", "tikhonov", "--warm-start", "--sum", "8"]);
+    let server = serve(&bench, &["--method", "tikhonov", "--warm-start", "--frames", "8"]);
     let state = server.state("recursive", |state| state["picture"]["past"].is_string());
     let past = state["picture"]["past"].as_str().unwrap();
     assert!(past.contains("patterns known, scene moved by"), "{past}");

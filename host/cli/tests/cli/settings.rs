@@ -26,7 +26,7 @@ fn the_command_line_beats_the_environment_and_that_the_file() {
     assert_eq!((&found["method"], &found["used"]), (&"hadamard".into(), &64.into()), "{found}");
     assert!(bench.path("from-file/report.json").exists());
 
-    let variables = [("NIRSPI_METHOD", "tv"), ("NIRSPI_ORDER", "zig-zag")];
+    let variables = [("NIRSPI_METHOD", "tv"), ("NIRSPI_FIRST_OF", "zig-zag")];
     let found = report(&bench, &variables, &file);
     assert_eq!((&found["method"], &found["order"]), (&"tv".into(), &"zig-zag".into()), "{found}");
     let found =

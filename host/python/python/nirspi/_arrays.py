@@ -107,7 +107,7 @@ def square_images(values: Any, name: str) -> np.ndarray:
 
 
 def share(value: Any) -> str:
-    """A share of the patterns as the command line reads it: 0.3, "30%" or 30."""
+    """A share of the patterns as the command line reads it: 0.3 or "30%"."""
     return value if isinstance(value, str) else repr(float(value))
 
 

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 def of(operator: Hadamard, **kwargs: Any) -> Any:
     """SPyRiT's operator of the same rows in the same order."""
-    import torch
-    from spyrit.core.meas import HadamSplit2d
+    try:
+        import torch
+        from spyrit.core.meas import HadamSplit2d
+    except ImportError as error:
+        raise Error(f"spyrit() needs spyrit and torch: pip install spyrit ({error})") from None
 
     if operator.scale != "sum":
         raise Error('scale is "ortho", expected "sum": entries of SPyRiT\'s matrix are +1 and -1')

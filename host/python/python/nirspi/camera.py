@@ -149,7 +149,7 @@ class Camera:
     order : str
         Order of the patterns, see :func:`nirspi.order`.
     sampling : float or str
-        Share of the 1024 patterns to show, the first of the order: 0.3, "30%" or 30.
+        Share of the 1024 patterns to show, the first of the order: 0.3 or "30%".
     sweeps : int
         Sweeps summed into one frame.
     clocks_per_pattern, blanked : int, optional

@@ -317,7 +317,10 @@ class Hadamard:
         **kwargs
             Of ``LinearPhysics``, for example ``noise_model``.
         """
-        from ._deepinv import HadamardPhysics
+        try:
+            from ._deepinv import HadamardPhysics
+        except ImportError as error:
+            raise Error(f"deepinv() needs deepinv and torch: pip install deepinv ({error})") from None
 
         return HadamardPhysics(self, **kwargs)
 

@@ -55,7 +55,7 @@ def reconstruct(
     *,
     method: str = "auto",
     sampling: float | str = 1.0,
-    order: str | None = None,
+    first_of: str | None = None,
     basis: str | None = None,
     index: int | str | None = None,
     dictionary: Any = None,
@@ -83,8 +83,8 @@ def reconstruct(
     method : str
         A name of :func:`methods`.
     sampling : float or str
-        Share of all ``n * n`` patterns to use: 0.3, "30%" or 30.
-    order : str, optional
+        Share of all ``n * n`` patterns to use: 0.3 or "30%".
+    first_of : str, optional
         Which patterns ``sampling`` uses: the first of this order, or "recorded". Default: those of
         the lowest sequencies.
     basis : str, optional
@@ -139,7 +139,7 @@ def reconstruct(
     options = method_options(
         method=method,
         sampling=sampling,
-        order=order,
+        first_of=first_of,
         basis=basis,
         sparsity=sparsity,
         residual=residual,
@@ -208,7 +208,7 @@ def method_options(
     *,
     method: str = "auto",
     sampling: float | str = 1.0,
-    order: str | None = None,
+    first_of: str | None = None,
     basis: str | None = None,
     sparsity: int | None = None,
     residual: float | None = None,
@@ -224,7 +224,7 @@ def method_options(
     return {
         "method": str(method),
         "sampling": _arrays.share(sampling),
-        "order": order,
+        "first_of": first_of,
         "basis": basis,
         "dictionary": None,
         "sparsity": _arrays.count(sparsity, "sparsity"),
@@ -305,8 +305,8 @@ def _by_matrix(readings: Any, matrix: Any, n: Any, dictionary: Any, options: dic
     y = readings.d if isinstance(readings, Measurement) else _arrays.real(readings, "y")
     if y.ndim < 1 or y.shape[-1] != weights.shape[0]:
         raise Error(f"y has shape {y.shape}, expected (..., {weights.shape[0]}): one a pattern")
-    if options["warm_start"] or options["order"] is not None:
-        raise Error("warm_start and order belong to Hadamard rows, not to a matrix")
+    if options["warm_start"] or options["first_of"] is not None:
+        raise Error("warm_start and first_of belong to Hadamard rows, not to a matrix")
     if dictionary is not None:
         options["dictionary"] = _atoms(dictionary, size)
     pixels, reports = _nirspi.reconstruct_matrix(
