@@ -455,6 +455,10 @@ pub(crate) fn by_law(
             let places = Places { read: &file.places, patterns: file.patterns };
             let places = Some(places).filter(|_| is_in_order);
             let mut read = law::read_at(&file.h_row, y, file.claim, places).map_err(wrong)?;
+            // Of readings the law says it, and of differences the file.
+            if file.most_noise.is_some() {
+                read.measurements = read.measurements.with_most_noise(file.most_noise);
+            }
             if let Some(noise) = file.noise {
                 read.measurements = read.measurements.with_noise(noise).map_err(wrong)?;
             }
@@ -501,7 +505,7 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
         }
     });
     let not_read = file.not_read;
-    let taken = Taken::of_file(path, file.simulated);
+    let taken = file.taken.from_file(path);
     let (frames, flat_field) = (None, None);
     Ok(Source {
         measurements: read.measurements,

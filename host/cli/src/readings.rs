@@ -7,7 +7,6 @@ use nirspi::files::measurement::write_readings;
 use nirspi::files::output::Existing;
 use nirspi::files::trace::{self, Cut, Raw};
 use nirspi::picture::{Figure, of_trace};
-use nirspi::provenance::Taken;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -108,7 +107,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         decimal_comma: args.decimal_comma,
     };
     let found = trace::read(&args.trace, &cut)?;
-    let provenance = Taken::of_file(&args.trace, None).made(provenance::made());
+    let provenance = found.taken.made(provenance::made());
     let figure = Figure::from(of_trace(&found, String::new()));
     let report = Report {
         input: args.trace.clone(),

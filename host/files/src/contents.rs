@@ -9,6 +9,7 @@ use super::FileError;
 use super::fields::Fields;
 use crate::field::{Field, is_counter};
 use crate::measurement::{self, MeasurementFile, Selection};
+use crate::provenance::Taken;
 use std::path::Path;
 
 /// Most different values of an array that are kept.
@@ -202,9 +203,10 @@ impl Contents {
         self.fields.read(array, |_| Ok(())).ok().map(|field| field.real)
     }
 
-    /// Whether the file says that no real light was measured; `None` if it does not say.
-    pub fn simulated(&mut self) -> Option<bool> {
-        measurement::read_simulated(&mut self.fields)
+    /// Where the numbers come from, by what the file says of it.
+    pub fn taken(&mut self) -> Taken {
+        let taken = self.fields.taken();
+        taken.from_file(self.fields.path())
     }
 
     /// The measurement of this file that a user asks for.

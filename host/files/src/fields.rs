@@ -11,11 +11,13 @@ use super::field::{EXPECTED, Field, is_counter};
 use super::hdf5::Hdf5;
 use super::mat::Mat;
 use super::mat4::Mat4;
+use super::measurement::{PROVENANCE, read_simulated};
 use super::npy;
-use super::plain::{is_mat_4, kind_by_start, open_file, open_start};
+use super::plain::{is_mat_4, kind_by_start, open_file, open_start, read_small_text};
 use super::stored::Stored;
 use super::text;
 use super::wav;
+use crate::provenance::{Origin, Taken, beside_array};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -42,6 +44,8 @@ pub(super) struct Fields {
     called: Vec<(&'static str, String)>,
     /// What a text has beside its table and is left out, in one line.
     skipped: Option<String>,
+    /// The provenance that a text or the file beside an array states, as JSON.
+    provenance: Option<String>,
     is_text: bool,
     is_wav: bool,
 }
@@ -58,16 +62,29 @@ enum Format {
     Unnamed(Field),
 }
 
+/// What the file beside an array says of where its numbers come from.
+pub(super) fn stated_beside(path: &Path) -> Option<Taken> {
+    Taken::stated(&beside(path)?)
+}
+
+/// The provenance in the file beside an array, as JSON.
+fn beside(path: &Path) -> Option<String> {
+    let text = read_small_text(&beside_array(path)).ok()?;
+    let report: serde_json::Value = serde_json::from_str(&text).ok()?;
+    report.get(PROVENANCE).map(ToString::to_string)
+}
+
 impl Fields {
     /// Opens a file of any of the formats. `decimal_comma` applies to text files only.
     pub(super) fn open(path: &Path, decimal_comma: bool) -> Result<Self, FileError> {
         let (_, length, start) = open_start(path, EXPECTED, START_BYTES)?;
-        let (mut skipped, mut is_text) = (None, false);
+        let (mut skipped, mut provenance, mut is_text) = (None, None, false);
         let is_wav = wav::is_start(&start);
         let (names, format) = if start.starts_with(b"PK") {
             let archive = Archive::open(path)?;
             (archive.names().to_vec(), Format::Npz(archive))
         } else if start.starts_with(super::array::MAGIC) {
+            provenance = beside(path);
             (Vec::new(), Format::Unnamed(npy::read_field(path)?))
         } else if start.starts_with(HDF5_MAGIC) || start.get(512..) == Some(HDF5_MAGIC) {
             open_hdf5(path, length, start.starts_with(b"MATLAB"))?
@@ -88,7 +105,7 @@ impl Fields {
             }
         } else if text::is_start(&start) {
             let text = text::read(path, decimal_comma)?;
-            (skipped, is_text) = (text.skipped, true);
+            (skipped, provenance, is_text) = (text.skipped, text.provenance, true);
             match text.numbers {
                 text::Numbers::Columns(columns) => {
                     let (names, fields) = columns.into_iter().unzip();
@@ -103,12 +120,14 @@ impl Fields {
         if decimal_comma && !is_of_text {
             return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
         }
-        Ok(Self { skipped, is_text, is_wav, ..Self::of_format(path, names, format) })
+        let opened = Self::of_format(path, names, format);
+        Ok(Self { skipped, provenance, is_text, is_wav, ..opened })
     }
 
     fn of_format(path: &Path, names: Vec<String>, format: Format) -> Self {
         let (path, made, called) = (path.to_owned(), Vec::new(), Vec::new());
-        Self { path, names, format, made, called, skipped: None, is_text: false, is_wav: false }
+        let (skipped, provenance, is_text, is_wav) = (None, None, false, false);
+        Self { path, names, format, made, called, skipped, provenance, is_text, is_wav }
     }
 
     /// One array without a name that was made of the file at `path`.
@@ -124,8 +143,9 @@ impl Fields {
             _ => return Self::open(&self.path, false),
         };
         let (skipped, is_text, is_wav) = (self.skipped.clone(), self.is_text, self.is_wav);
+        let provenance = self.provenance.clone();
         let again = Self::of_format(&self.path, self.names.clone(), format);
-        Ok(Self { skipped, is_text, is_wav, ..again })
+        Ok(Self { skipped, provenance, is_text, is_wav, ..again })
     }
 
     /// The format, in a few words.
@@ -163,6 +183,19 @@ impl Fields {
             Format::Npz(archive) => archive.text(field),
             _ => None,
         }
+    }
+
+    /// Where the numbers come from, by what the file says: in the provenance that this program writes, or else whether no
+    /// real light was measured. The name of the file is left out.
+    pub(super) fn taken(&mut self) -> Taken {
+        let json = match &mut self.format {
+            Format::Npz(archive) => archive.text(PROVENANCE),
+            _ => self.provenance.clone(),
+        };
+        let stated = json.and_then(|json| Taken::stated(&json));
+        stated
+            .filter(|taken| taken.origin != Origin::Unknown)
+            .unwrap_or_else(|| Taken::simulated_or(read_simulated(self)))
     }
 
     /// Whether the file is a text.

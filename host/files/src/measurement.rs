@@ -19,7 +19,9 @@
 //! | `sign` | optional, as many as readings: 1 for a pattern, -1 or 0 for a complement, of the same row of `h_row` or else of the next one |
 //! | `readings` | optional, with `y`, a text: its form, unless [`Selection::form`] is given |
 //! | `simulated` | optional: 1 if no real light was measured |
-//! | `noise` | optional, with `d`: standard deviation of the noise of a value of `d`, the same for all |
+//! | `provenance` | optional, a text: the JSON of a [`Provenance`](crate::provenance::Provenance), which says more |
+//! | `noise` | optional, with `d`: standard deviation of the noise of a value of `d`, the same for all patterns; one number, or one for each measurement; NaN: not known |
+//! | `most_noise` | optional, in the same form: what this noise is at most, where it is estimated |
 //! | `recon` | optional `(n, n)`, or one for each measurement: someone's reconstruction, to compare with |
 //!
 //! A row that was shown several times has the mean of its readings. Rows and readings may both be
@@ -36,6 +38,7 @@ mod form;
 mod images;
 mod layout;
 mod named;
+mod noise;
 mod opened;
 mod patterns;
 mod plain;
@@ -51,6 +54,7 @@ mod write;
 
 use super::FileError;
 use super::fields::Fields;
+use super::provenance::Taken;
 pub use form::Form;
 pub use images::read_images_of;
 pub use named::NamedPatterns;
@@ -68,7 +72,7 @@ use std::path::Path;
 pub use sweeps::{Sweeps, most_together};
 pub use weighed::Plain;
 pub(crate) use write::READINGS;
-pub use write::{NOISE, PROVENANCE, encode, write_readings};
+pub use write::{PROVENANCE, encode, noise_of, write_readings};
 
 /// What to read from a file, and what the file itself does not say.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -145,10 +149,12 @@ pub struct MeasurementFile {
     pub patterns: usize,
     /// The file's own reconstruction, if it holds one.
     pub reference: Option<Reference>,
-    /// Whether the file says that no real light was measured; `None` if it does not say.
-    pub simulated: Option<bool>,
+    /// Where the readings come from, by what the file says of it, without the name of the file.
+    pub taken: Taken,
     /// Standard deviation of the noise of a value of `d`, if the file says so and `d` was read.
     pub noise: Option<f64>,
+    /// What this noise is at most, in the same case.
+    pub most_noise: Option<f64>,
     /// Oddities of the file that do not make it unusable, one line each.
     pub notes: Vec<String>,
 }

@@ -13,7 +13,7 @@ use crate::{boards, clock};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The key of the JSON text: a PNG's text chunk and an MCAP file's metadata record.
 pub const KEY: &str = "nirspi-provenance";
@@ -101,12 +101,24 @@ impl Taken {
     /// Readings of a file whose camera is unknown. `simulated` is what the file says of that.
     #[must_use]
     pub fn of_file(path: &Path, simulated: Option<bool>) -> Self {
-        let origin = match simulated {
+        Self::simulated_or(simulated).from_file(path)
+    }
+
+    /// Readings of which no more is known than whether they are simulated, and maybe not that.
+    #[must_use]
+    pub fn simulated_or(simulated: Option<bool>) -> Self {
+        Self::without_camera(match simulated {
             Some(true) => Origin::Simulated,
             Some(false) => Origin::Measured,
             None => Origin::Unknown,
-        };
-        Self { origin, camera: None, file: None }.from_file(path)
+        })
+    }
+
+    /// What the JSON text of a [`Provenance`] says of the readings, without the name of their file. `None` for another text.
+    #[must_use]
+    pub(crate) fn stated(json: &str) -> Option<Self> {
+        let found: Provenance = serde_json::from_str(json).ok()?;
+        Some(Self { file: None, ..found.taken })
     }
 
     /// No readings of a camera: those of a model, or none.
@@ -274,6 +286,14 @@ impl fmt::Display for Provenance {
         let day = self.made.date.split('T').next().unwrap_or_default();
         write!(f, "{}, {}, {day}", self.source(), self.software())
     }
+}
+
+/// The name of the file with the provenance of an `.npy` file: the same name with `.json` after it.
+#[must_use]
+pub fn beside_array(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".json");
+    name.into()
 }
 
 /// Words in the names of options and of parts of addresses whose values are secrets.

@@ -13,6 +13,7 @@ mod export;
 
 use super::FileError;
 use super::field::{EXPECTED, Field};
+use super::measurement::PROVENANCE;
 use super::plain::{is_heading, read_large_text, start_of_text};
 use rayon::prelude::*;
 use std::path::Path;
@@ -33,6 +34,8 @@ pub(super) struct Text {
     pub(super) numbers: Numbers,
     /// What was left out, in one line.
     pub(super) skipped: Option<String>,
+    /// The provenance in a comment, as JSON.
+    pub(super) provenance: Option<String>,
 }
 
 /// The numbers of a text file.
@@ -68,8 +71,10 @@ fn read_str(path: &Path, text: String, decimal_comma: bool) -> Result<Text, File
     let text = if text.contains('\n') { text } else { text.replace('\r', "\n") };
     let text = listed(&text).or_else(|| labelled(&text)).unwrap_or(text);
     let lines = Lines::of(&text);
+    let signed =
+        |numbers, skipped| Text { provenance: provenance(&text), ..Text::new(numbers, skipped) };
     let refused = match plain(path, &lines, decimal_comma) {
-        Ok(numbers) => return Ok(Text::new(numbers, None)),
+        Ok(numbers) => return Ok(signed(numbers, None)),
         Err(error) => error,
     };
     let Some(found) = export::find(path, &lines, decimal_comma) else { return Err(refused) };
@@ -83,7 +88,16 @@ fn read_str(path: &Path, text: String, decimal_comma: bool) -> Result<Text, File
             Numbers::Table(Field { shape: vec![height, width], real, imaginary: None })
         }
     };
-    Ok(Text::new(numbers, skipped))
+    Ok(signed(numbers, skipped))
+}
+
+/// The provenance in one of the comments before the table, as an export writes it.
+fn provenance(text: &str) -> Option<String> {
+    let mut comments = text.lines().take_while(|line| line.starts_with('#'));
+    let of = |line: &str| {
+        Some(line[1..].trim_start().strip_prefix(PROVENANCE)?.strip_prefix(": ")?.to_owned())
+    };
+    comments.find_map(of)
 }
 
 /// The rows of a list in brackets, as Python prints it and the Red Pitaya sends it: brackets within the outer ones hold a row
@@ -141,7 +155,8 @@ impl Text {
                 }
             }
         }
-        Self { numbers, skipped: (!notes.is_empty()).then(|| notes.join("; ")) }
+        let skipped = (!notes.is_empty()).then(|| notes.join("; "));
+        Self { numbers, skipped, provenance: None }
     }
 }
 

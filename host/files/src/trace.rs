@@ -13,6 +13,7 @@ mod words;
 
 use super::FileError;
 use super::fields::UNNAMED;
+use super::provenance::Taken;
 use series::{Series, Shape};
 use std::ops::Range;
 use std::path::Path;
@@ -164,6 +165,8 @@ pub struct Found {
     pub cut_off: Option<usize>,
     /// What a text has beside its table and was left out, in one line.
     pub skipped: Option<String>,
+    /// Where the samples come from, by what the file says of it.
+    pub taken: Taken,
     /// The first readings.
     pub first: First,
 }
@@ -264,6 +267,7 @@ pub fn read(path: &Path, cut: &Cut) -> Result<Found, FileError> {
         overloads: sums.overloads,
         cut_off: cut_off.filter(|_| cut.count.is_none()),
         skipped: series.skipped().map(str::to_owned),
+        taken: series.taken().from_file(path),
         first,
     })
 }

@@ -11,6 +11,7 @@ mod run;
 pub use run::Run;
 
 use crate::errors::{of_opening, refusal, refused};
+use crate::made::said;
 use crate::work::long;
 use nirspi::address::CameraAddress;
 use nirspi::capture::CalibrationPolicy;
@@ -18,6 +19,7 @@ use nirspi::capture::{Calibration, CaptureError, CaptureOptions};
 use nirspi::causes::in_one_line;
 use nirspi::frame_time::HostClock;
 use nirspi::link::Link;
+use nirspi::provenance::Taken;
 use nirspi::recording::Target;
 use nirspi::response::Settling;
 use nirspi::session::{IgnorePackets, Session, SessionError};
@@ -70,6 +72,8 @@ pub struct Camera {
     /// What a perfect camera would see of a virtual camera's scene.
     truth: Option<Vec<f32>>,
     identity: String,
+    /// Where its readings come from, as JSON.
+    taken: String,
     reports: Vec<String>,
     /// What the last run has counted.
     last: Mutex<Option<Arc<Shared>>>,
@@ -145,7 +149,9 @@ impl Camera {
             Ok((session, calibrated, flat, truth))
         })?;
         let identity = serde_json::to_string(session.identity());
+        let taken = said(&Taken::by(session.identity()))?;
         Ok(Self {
+            taken,
             identity: identity.map_err(|error| refused(error.to_string()))?,
             reports: session.reports().lines.clone(),
             state: Arc::new(Mutex::new(State::Idle(Box::new(session)))),
@@ -157,6 +163,12 @@ impl Camera {
             last: Mutex::new(None),
             process: std::process::id(),
         })
+    }
+
+    /// Where the readings come from, as JSON.
+    #[getter]
+    fn taken(&self) -> &str {
+        &self.taken
     }
 
     /// The identity as JSON.

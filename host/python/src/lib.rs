@@ -39,6 +39,8 @@ mod _nirspi {
     #[pymodule_export]
     use crate::loaded::{Loaded, load};
     #[pymodule_export]
+    use crate::made::provenance;
+    #[pymodule_export]
     use crate::measurement::{FlatField, readings};
     #[pymodule_export]
     use crate::metrics::{correlation, fit, psnr, scaled, ssim};

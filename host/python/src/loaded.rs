@@ -2,6 +2,7 @@
 
 use crate::arrays::{array, fill, room};
 use crate::errors::of_source;
+use crate::made::said;
 use crate::measurement::{FlatField, Lost, Options, lost, numbers, warnings};
 use crate::work::{heavy, long};
 use nirspi::source::{Index, Several, Source};
@@ -11,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::collections::HashSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// One measurement, or several of the same scene side by side.
 #[pyclass(frozen, get_all, module = "nirspi._nirspi")]
@@ -38,10 +39,13 @@ pub struct Loaded {
     /// What a recording lacks.
     damage: Option<String>,
     flat_field: Option<Py<FlatField>>,
-    /// Standard deviation of the noise of a difference of the one measurement, if it is known.
-    noise: Option<f64>,
-    /// What it is at most, if sums of patterns and complements say it.
-    most_noise: Option<f64>,
+    /// Where the readings come from, as JSON.
+    taken: String,
+    /// Standard deviation of the noise of a difference of each measurement; NaN where it is not known. `None` if it is known
+    /// of none.
+    noise: Option<Vec<f64>>,
+    /// What it is at most, in the same form, if sums of patterns and complements say it.
+    most_noise: Option<Vec<f64>>,
 }
 
 /// The measurements of a file or recording: one, or all with `index` "all".
@@ -54,7 +58,7 @@ pub fn load(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyRes
     }
     let sources = match long(py, |_| Several::of(&path, &options).map_err(of_source))? {
         Some(mut several) => {
-            if let Some(block) = Loaded::block(py, &mut several)? {
+            if let Some(block) = Loaded::block(py, &path, &mut several)? {
                 return Ok(block);
             }
             long(py, |_| several.each().map_err(of_source))?
@@ -67,7 +71,7 @@ pub fn load(py: Python<'_>, path: PathBuf, options: &Bound<'_, PyDict>) -> PyRes
 impl Loaded {
     /// The measurements of a file that has them side by side itself; `None` for a file whose measurements differ in
     /// their patterns, or are no real differences.
-    fn block(py: Python<'_>, several: &mut Several<'_>) -> PyResult<Option<Self>> {
+    fn block(py: Python<'_>, path: &Path, several: &mut Several<'_>) -> PyResult<Option<Self>> {
         let Some(stack) = long(py, |_| several.stack().map_err(of_source))? else {
             return Ok(None);
         };
@@ -79,6 +83,7 @@ impl Loaded {
                 return Ok(None);
             }
         }
+        let known: Vec<_> = (0..stack.count()).map(|index| stack.noise(index)).collect();
         Ok(Some(Self {
             n: stack.side().pixels(),
             rows: array(py, numbers(stack.rows())).unbind(),
@@ -92,8 +97,9 @@ impl Loaded {
             notes: stack.notes().to_vec(),
             damage: None,
             flat_field: None,
-            noise: None,
-            most_noise: None,
+            taken: said(&stack.taken().clone().from_file(path))?,
+            noise: of_each(known.iter().map(|[known, _]| *known)),
+            most_noise: of_each(known.iter().map(|[_, most]| *most)),
         }))
     }
 
@@ -123,8 +129,9 @@ impl Loaded {
             }
         }
         let flat_field = first.flat_field.clone();
-        let noise = first.measurements.noise().filter(|_| !several);
-        let most_noise = first.measurements.most_noise().filter(|_| !several);
+        let taken = said(&first.taken)?;
+        let noise = of_each(sources.iter().map(|source| source.measurements.noise()));
+        let most_noise = of_each(sources.iter().map(|source| source.measurements.most_noise()));
         Ok(Self {
             n: side.pixels(),
             rows: array(py, rows.iter().map(|&row| i64::from(row)).collect()).unbind(),
@@ -136,12 +143,19 @@ impl Loaded {
             frames: first.frames.map(|c| (c.received, c.lost, c.corrupt, c.late)),
             notes,
             damage: first.damage.clone(),
+            taken,
             noise,
             most_noise,
             flat_field: flat_field.map(|flat| Py::new(py, FlatField(flat))).transpose()?,
             dropouts: sources.into_iter().map(|source| lost(source.dropouts)).collect(),
         })
     }
+}
+
+/// What is known of each measurement, NaN where it is not; `None` if it is known of none.
+fn of_each(known: impl Iterator<Item = Option<f64>> + Clone) -> Option<Vec<f64>> {
+    let any = known.clone().any(|one| one.is_some());
+    any.then(|| known.map(|one| one.unwrap_or(f64::NAN)).collect())
 }
 
 /// The rows of all measurements, parts of one order, in an order of which each measurement's rows are a part.

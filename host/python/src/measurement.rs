@@ -121,16 +121,19 @@ pub(crate) fn lost(dropouts: Vec<Dropout>) -> Vec<Lost> {
     dropouts.into_iter().map(|d| (d.start, d.length, d.rows)).collect()
 }
 
-/// The differences of readings in a form, one measurement: `(rows, d, dropouts, notes)`.
+/// Rows, differences, what their noise is at most, drop-outs and notes.
+type Readings<'py> =
+    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, Option<f64>, Vec<Lost>, Vec<String>);
+
+/// The differences of readings in a form, one measurement.
 #[pyfunction]
-#[expect(clippy::type_complexity, reason = "a tuple for Python")]
 pub fn readings<'py>(
     py: Python<'py>,
     n: u64,
     shown: PyReadonlyArray1<'py, i64>,
     y: PyReadonlyArray1<'py, f64>,
     form: &str,
-) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, Vec<Lost>, Vec<String>)> {
+) -> PyResult<Readings<'py>> {
     let form = word::<Form>("readings", form)?;
     let rows = rows(side(n)?, &shown)?;
     let y = slice(&y)?;
@@ -142,7 +145,9 @@ pub fn readings<'py>(
         .collect();
     notes.extend(warnings(&read.outliers, read.doubts.iter().map(Doubt::to_string)));
     let rows = array(py, numbers(read.measurements.rows()));
-    Ok((rows, array(py, read.measurements.into_values()), lost(read.dropouts), notes))
+    let most_noise = read.measurements.most_noise();
+    let d = array(py, read.measurements.into_values());
+    Ok((rows, d, most_noise, lost(read.dropouts), notes))
 }
 
 /// Outliers and what contradicts the readings, in words.

@@ -2,10 +2,9 @@
 
 use crate::arrays::{slice, whole};
 use crate::errors::refused;
-use crate::made::made;
+use crate::made::of_origin;
 use crate::work::heavy;
 use nirspi::picture::{Figure, FigureStyle, Panel, Sheet, Unit};
-use nirspi::provenance::{Origin, Taken};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -28,6 +27,7 @@ pub fn picture<'py>(
     unit_name: &str,
     caption: Vec<String>,
     warnings: Vec<String>,
+    taken: Option<&str>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let values = slice(&values)?;
     let (width, height) = size;
@@ -37,7 +37,7 @@ pub fn picture<'py>(
             values.len()
         )));
     }
-    let provenance = Taken::without_camera(Origin::Unknown).made(&made(py)?);
+    let provenance = of_origin(py, taken)?;
     let panel = Panel {
         width,
         height,
@@ -58,11 +58,12 @@ pub fn sheet<'py>(
     n: usize,
     header: String,
     unit_name: &str,
+    taken: Option<&str>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let values = slice(&values)?;
     whole("the stack", values.len(), n * n)?;
     let unit = unit(unit_name)?;
-    let provenance = Taken::without_camera(Origin::Unknown).made(&made(py)?);
+    let provenance = of_origin(py, taken)?;
     let png = heavy(py, || {
         let sheet = Sheet::new(header, (n, n), values.chunks_exact(n * n).collect(), unit);
         Ok(sheet.png(&FigureStyle::Paper.on_screen(), &provenance))

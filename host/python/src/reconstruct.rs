@@ -5,6 +5,7 @@
 
 use crate::arrays::{array, fill, room, rows, side, slice, whole};
 use crate::errors::{of_source, refusal, refused};
+use crate::made::said;
 use crate::measurement::{self, numbers};
 use crate::orders::named;
 use crate::work::{backend, long};
@@ -12,8 +13,9 @@ use nirspi::imaging::MethodReport;
 use nirspi::source::{FirstPatterns, Index, Several};
 use nirspi_nets::{deblur, fusion};
 use nirspi_recon::reconstruct::{
-    MatrixSettings, Method, MethodSettings, OwnAtoms, OwnMatrix, Reconstruct, ReconstructError,
-    Reconstruction, Report, Setting, Sparsity, Strength, stack_while,
+    KnownNoise, MatrixMethod, MatrixSettings, Method, MethodSettings, NoiseFrom, OwnAtoms,
+    OwnMatrix, Penalty, Reconstruct, ReconstructError, Reconstruction, Report, Setting, Sparsity,
+    Strength, stack_while,
 };
 use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Size};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
@@ -51,10 +53,11 @@ pub(crate) struct Options<'py> {
     as_printed: bool,
     non_negative: bool,
     warm_start: bool,
-    /// Standard deviation of the noise of a difference; `None`: estimated.
-    noise: Option<f64>,
+    /// Standard deviation of the noise of a difference, one number for all measurements or one for each; NaN or `None`:
+    /// estimated.
+    noise: Option<Vec<f64>>,
     /// What it is at most.
-    most_noise: Option<f64>,
+    most_noise: Option<Vec<f64>>,
     dark: bool,
     device: String,
 }
@@ -124,10 +127,10 @@ impl Options<'_> {
 }
 
 /// The measurements of a frame without the patterns that were not read (NaN).
-fn frame(rows: &Rows, d: &[f64], noise: Noise) -> PyResult<Measurements> {
-    let with_noise = |measurements: Measurements| match noise.known {
-        Some(noise) => measurements.with_noise(noise),
-        None => Ok(measurements.with_most_noise(noise.most)),
+fn frame(rows: &Rows, d: &[f64], [known, most]: [Option<f64>; 2]) -> PyResult<Measurements> {
+    let with_noise = |measurements: Measurements| match known {
+        Some(noise) => measurements.with_most_noise(most).with_noise(noise),
+        None => Ok(measurements.with_most_noise(most)),
     };
     // Without an early end, so that the compiler uses vectors.
     if !d.iter().fold(false, |nan, value| nan | value.is_nan()) {
@@ -150,11 +153,27 @@ fn of_method(error: ReconstructError) -> PyErr {
     refusal(error)
 }
 
-/// What is known of the noise of a difference.
-#[derive(Clone, Copy, Default)]
-struct Noise {
-    known: Option<f64>,
-    most: Option<f64>,
+/// What is known of the noise of a difference, and what it is at most: one number for all measurements, or one for each.
+#[derive(Clone, Default)]
+struct Noise([Option<Vec<f64>>; 2]);
+
+impl Noise {
+    /// Checks that there is one number, or one for each measurement.
+    fn check(&self, count: usize) -> PyResult<()> {
+        match self.0.iter().flatten().find(|said| said.len() != 1 && said.len() != count) {
+            None => Ok(()),
+            Some(said) => {
+                let found = said.len();
+                Err(refused(format!("{found} noises, expected one, or one for each of {count}")))
+            }
+        }
+    }
+
+    /// That of the measurement of this index.
+    fn of(&self, index: usize) -> [Option<f64>; 2] {
+        let said = |all: &Option<Vec<f64>>| all.as_ref().map(|all| all[index % all.len()]);
+        [&self.0[0], &self.0[1]].map(|all| said(all).filter(|sigma| !sigma.is_nan()))
+    }
 }
 
 /// A method made ready for measurements of the same rows.
@@ -183,18 +202,18 @@ impl Ready {
         Ok(Self { method, rows, first, sampling, noise, whole, order })
     }
 
-    /// The measurements that are used of these differences, and the name of the order that chose them.
-    fn taken(&self, d: &[f64]) -> PyResult<(Measurements, String)> {
-        let frame = frame(&self.rows, d, self.noise)?;
+    /// The measurements that are used of the differences of this index, and the name of the order that chose them.
+    fn taken(&self, index: usize, d: &[f64]) -> PyResult<(Measurements, String)> {
+        let frame = frame(&self.rows, d, self.noise.of(index))?;
         if *frame.rows() == self.rows {
             return Ok((self.whole.shorten(frame), self.order.clone()));
         }
         self.first.take(&frame, self.sampling).map_err(refusal)
     }
 
-    /// Writes the image of these differences to `pixels`.
-    fn image(&self, d: &[f64], pixels: &mut [f32]) -> PyResult<Made> {
-        let (used, order) = self.taken(d)?;
+    /// Writes the image of the differences of this index to `pixels`.
+    fn image(&self, index: usize, d: &[f64], pixels: &mut [f32]) -> PyResult<Made> {
+        let (used, order) = self.taken(index, d)?;
         let report = self.method.reconstruct_into(&used, pixels).map_err(of_method)?;
         Made::new(report, &used, order, pixels)
     }
@@ -211,16 +230,17 @@ impl Ready {
         let area = self.rows.side().area();
         let is_on = || !stop.load(Ordering::Relaxed);
         if !warm && self.method.is_of_each() {
-            let one = |(d, place): (&[f64], &mut [f32])| match is_on() {
-                true => self.image(d, place),
+            let one = |(index, (d, place)): (usize, (&[f64], &mut [f32]))| match is_on() {
+                true => self.image(index, d, place),
                 false => Err(stopped()),
             };
             let frames = d.par_chunks_exact(self.rows.len());
-            return frames.zip(pixels.par_chunks_exact_mut(area)).map(one).collect();
+            let frames = frames.zip(pixels.par_chunks_exact_mut(area)).enumerate();
+            return frames.map(one).collect();
         }
-        let frames = d.par_chunks_exact(self.rows.len());
-        let (used, orders): (Vec<Measurements>, Vec<String>) =
-            frames.map(|d| self.taken(d)).collect::<PyResult<Vec<_>>>()?.into_iter().unzip();
+        let frames = d.par_chunks_exact(self.rows.len()).enumerate();
+        let taken = frames.map(|(index, d)| self.taken(index, d)).collect::<PyResult<Vec<_>>>()?;
+        let (used, orders): (Vec<Measurements>, Vec<String>) = taken.into_iter().unzip();
         let going_on = || if is_on() { Ok(()) } else { Err(ReconstructError::Stopped) };
         let made = match warm {
             true => self.method.reconstruct_video(&used),
@@ -331,11 +351,11 @@ pub fn reconstruct<'py>(
     d: PyReadonlyArray1<'py, f64>,
     options: &Bound<'py, PyDict>,
 ) -> PyResult<(Pixels<'py>, OfPython<'py>)> {
-    let options: Options<'_> = options.extract()?;
+    let mut options: Options<'_> = options.extract()?;
     let (method, settings) = (options.method()?, options.settings()?);
     let (first, sampling) = (options.first()?, options.sampling()?);
     let warm = options.warm_start;
-    let noise = Noise { known: options.noise, most: options.most_noise };
+    let noise = Noise([options.noise.take(), options.most_noise.take()]);
     if warm && !method.takes(Setting::WarmStart) {
         let methods = Method::listed(|method| method.takes(Setting::WarmStart));
         return Err(refused(format!("warm-start belongs to {methods}, not to {method}")));
@@ -344,7 +364,9 @@ pub fn reconstruct<'py>(
     let rows = rows(side(n)?, &shown)?;
     let d = slice(&d)?;
     let area = rows.side().area();
-    let pixels = room::<f32>(py, whole("d", d.len(), rows.len())? * area)?;
+    let count = whole("d", d.len(), rows.len())?;
+    noise.check(count)?;
+    let pixels = room::<f32>(py, count * area)?;
     let mut place = pixels.readwrite();
     let places = fill(&mut place)?;
     let account = long(py, |stop| {
@@ -356,6 +378,9 @@ pub fn reconstruct<'py>(
     Ok((pixels, account.into_python(py)))
 }
 
+/// Side of the images, their number, the images, an account of them, and where the readings come from, as JSON.
+type OfFile<'py> = (usize, usize, Pixels<'py>, OfPython<'py>, String);
+
 /// As [`reconstruct`], of all measurements of a file, which are read while they are reconstructed; before them the side
 /// of the images and their number. `None` for a file or options that need all measurements in memory first, and for a
 /// measurement that is refused.
@@ -365,7 +390,7 @@ pub fn reconstruct_file<'py>(
     path: PathBuf,
     source: &Bound<'py, PyDict>,
     options: &Bound<'py, PyDict>,
-) -> PyResult<Option<(usize, usize, Pixels<'py>, OfPython<'py>)>> {
+) -> PyResult<Option<OfFile<'py>>> {
     let source = source.extract::<measurement::Options>()?.checked()?;
     let options: Options<'_> = options.extract()?;
     if options.warm_start || source.index != Some(Index::All) {
@@ -385,21 +410,27 @@ pub fn reconstruct_file<'py>(
         return Ok(None);
     };
     let (side, count) = (stack.side(), stack.count());
+    let taken = said(&stack.taken().clone().from_file(&path))?;
+    let noise = stack.noise(0);
+    if (1..count).any(|index| stack.noise(index) != noise) {
+        // While it is read, a measurement does not know its index.
+        return Ok(None);
+    }
+    let noise = Noise(noise.map(|said| said.map(|sigma| vec![sigma])));
     let pixels = room::<f32>(py, count * side.area())?;
     let mut place = pixels.readwrite();
     let places = fill(&mut place)?;
     let account = long(py, |stop| {
-        let ready =
-            Ready::new(method, &settings, stack.rows().clone(), first, sampling, Noise::default())?;
+        let ready = Ready::new(method, &settings, stack.rows().clone(), first, sampling, noise)?;
         let one = |d: &[f64], place: &mut [f32]| match stop.load(Ordering::Relaxed) {
             true => None,
-            false => ready.image(d, place).ok(),
+            false => ready.image(0, d, place).ok(),
         };
         let made = stack.map_into(places, one).map_err(|error| of_source(error.into()))?;
         made.map(|made| Account::of(made, method, places)).transpose()
     })?;
     drop(place);
-    Ok(account.map(|account| (side.pixels(), count, pixels, account.into_python(py))))
+    Ok(account.map(|account| (side.pixels(), count, pixels, account.into_python(py), taken)))
 }
 
 /// The images of readings by patterns of one's own, and a report of each as JSON.
@@ -411,7 +442,8 @@ pub fn reconstruct_matrix<'py>(
     y: PyReadonlyArray1<'py, f64>,
     options: &Bound<'py, PyDict>,
 ) -> PyResult<(Bound<'py, PyArray1<f32>>, Vec<String>)> {
-    let options: Options<'_> = options.extract()?;
+    let mut options: Options<'_> = options.extract()?;
+    let noise = Noise([options.noise.take(), None]);
     let method = options.method()?;
     let settings = options.settings()?;
     settings.check(method).map_err(of_method)?;
@@ -430,7 +462,10 @@ pub fn reconstruct_matrix<'py>(
     };
     let size = Size::new(size.0, size.1).map_err(refusal)?;
     let (weights, y) = (slice(&weights)?, slice(&y)?);
-    let (pixels, reports) = long(py, |stop| of_matrix(size, weights, y, method, &settings, stop))?;
+    let (pixels, reports) = long(py, |stop| {
+        let matrix = OwnMatrix::new(size, weights).map_err(refusal)?;
+        of_matrix(&matrix, (y, &noise), method, &settings, stop)
+    })?;
     Ok((array(py, pixels), reports))
 }
 
@@ -438,18 +473,31 @@ pub fn reconstruct_matrix<'py>(
 const TOGETHER: usize = 32;
 
 fn of_matrix(
-    size: Size,
-    weights: &[f64],
-    y: &[f64],
+    matrix: &OwnMatrix,
+    (y, noise): (&[f64], &Noise),
     method: Method,
     settings: &MatrixSettings,
     stop: &AtomicBool,
 ) -> PyResult<(Vec<f32>, Vec<String>)> {
-    let matrix = OwnMatrix::new(size, weights).map_err(refusal)?;
     whole("y", y.len(), matrix.patterns())?;
     let (mut pixels, mut reports) = (Vec::new(), Vec::new());
     let all: Vec<&[f64]> = y.chunks_exact(matrix.patterns()).collect();
-    for some in all.chunks(TOGETHER) {
+    noise.check(all.len())?;
+    let weighs = matrix.weighs_noise(settings);
+    let is_stated = (0..all.len()).any(|index| noise.of(index)[0].is_some());
+    let found = if weighs && !is_stated { matrix.known_noise(&all) } else { None };
+    let known = |index: usize| {
+        let stated = noise.of(index)[0].filter(|_| weighs);
+        stated.map(|sigma| KnownNoise { sigma, from: NoiseFrom::Stated }).or(found)
+    };
+    let mut next = 0;
+    while next < all.len() {
+        let (first, of_some) = (next, known(next));
+        while next < all.len().min(first + TOGETHER) && known(next) == of_some {
+            next += 1;
+        }
+        let (some, sigma) = (&all[first..next], of_some.map(|known| known.sigma));
+        let settings = &MatrixSettings { noise: sigma, ..settings.clone() };
         if stop.load(Ordering::Relaxed) {
             return Err(stopped());
         }
@@ -457,11 +505,14 @@ fn of_matrix(
             pixels.extend_from_slice(made.image.pixels());
             let (atoms, why) = made.atoms.map(|(atoms, stop)| (atoms, format!("{stop:?}"))).unzip();
             let method = Method::of_matrix(made.method).unwrap_or(method);
+            let used = of_some.filter(|_| made.method == MatrixMethod::Penalty(Penalty::Tikhonov));
             let report = serde_json::json!({
                 "method": method.argument(), "used": matrix.patterns(), "order": "as given", "warm": false,
                 "rank": matrix.rank(), "unseen_pixels": matrix.unseen_pixels(),
                 "strength": made.strength, "sparsity": atoms, "stop": why,
                 "dark_level": settings.dark.then_some(made.dark.value()), "note": made.dark.note(),
+                "noise_of_a_reading": used.map(|known| known.sigma),
+                "noise_from": used.map(|known| known.from.name()),
                 "relative_residual": made.residual,
                 "words": format!("{}, {} patterns of one's own, dark level {:.4}, relative residual {:.3}",
                                  method.name(), matrix.patterns(), made.dark.value(), made.residual),

@@ -81,6 +81,27 @@ def test_a_measurement_knows_its_noise_however_it_was_taken(tmp_path):
     assert loaded.noise == recorded.noise and np.allclose(loaded.d, recorded.d, rtol=1e-12)
 
 
+def test_images_pictures_and_files_name_the_camera(tmp_path):
+    with virtual() as camera:
+        recorded = camera.record(tmp_path / "a.mcap", frames=4)
+        captured = camera.capture(4)
+        serial = camera.identity["serial"]
+    captured.save(tmp_path / "b.npz")
+    loaded = ns.load(tmp_path / "b.npz")
+    every = ns.load(tmp_path / "a.mcap", index="all")
+    for measurement in (recorded, captured, loaded, ns.load(tmp_path / "a.mcap"), every, every[1:]):
+        assert measurement.origin["origin"] == "simulated"
+        assert measurement.origin["camera"]["serial"] == serial
+    assert loaded.origin["file"] == "b.npz"
+    image = ns.reconstruct(loaded, method="hadamard")
+    sharp = ns.enhance(image)
+    for made in (image, pickle.loads(pickle.dumps(image)), sharp, ns.reconstruct(every, method="hadamard")):
+        assert made.origin["camera"]["serial"] == serial
+        assert f'"serial":"{serial}"'.encode() in made.png()
+    plain = ns.reconstruct(ns.Measurement(d=loaded.d, rows=loaded.rows, n=32), method="hadamard")
+    assert plain.origin is None and serial.encode() not in plain.png()
+
+
 def test_a_capture_shows_the_scene():
     scene = np.zeros((32, 32), np.float32)
     scene[6:14, 8:26] = 0.9

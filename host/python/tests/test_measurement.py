@@ -1,6 +1,7 @@
 """Measurements in memory and from files."""
 
 import pickle
+import subprocess
 
 import numpy as np
 import pytest
@@ -298,6 +299,95 @@ def test_parts_and_pickles_are_measurements():
     assert (m.take(10).rows == m.rows[:10]).all()
     other = pickle.loads(pickle.dumps(m))
     assert (other.d == m.d).all() and other.n == N
+
+
+def test_what_pairs_say_of_their_noise_comes_through_every_door(cli, tmp_path, random):
+    # A quarter of noisy pairs: their sums say more of the noise than their differences.
+    rows = ns.order("zig-zag", 32)[:256]
+    figure = np.zeros((32, 32))
+    figure[6:25, 9:15] = figure[6:12, 9:24] = 1.0
+    y = ns.Hadamard(32, rows=rows, split=True)(np.stack([figure, figure.T + 0.2]))
+    y += random.normal(scale=[[3.0], [9.0]], size=y.shape)
+    np.savez(tmp_path / "one.npz", n=32, h_row=rows, y=y[0])
+    np.savez(tmp_path / "two.npz", n=32, h_row=rows, y=y)
+    np.savez(tmp_path / "scope.npz", y=np.repeat(y[0], 3))
+
+    def images(given, **options):
+        return ns.reconstruct(given, method="tikhonov", **options)
+
+    from_file = ns.load(tmp_path / "one.npz")
+    expected = images(from_file)
+    alone = ns.Measurement(d=from_file.d, rows=rows, n=32)
+    assert from_file.most_noise > 3 and (images(alone) != expected).any()
+    in_memory = ns.Measurement(y=y[0], rows=rows, n=32)
+    in_memory.save(tmp_path / "d.npz")
+    with ns.Feed([y[0]], n=32, order=rows) as feed:
+        fed = feed.capture(1)
+    doors = {
+        "memory": in_memory,
+        "halves": ns.Measurement(
+            y=np.concatenate([y[0, 0::2], y[0, 1::2]]), rows=rows, n=32, readings="halves"
+        ),
+        "differences": ns.Measurement(d=from_file.d, rows=rows, n=32, most_noise=from_file.most_noise),
+        "saved": ns.load(tmp_path / "d.npz"),
+        "table": ns.Measurement.from_table({"n": [32] * 512, "y": y[0], "h_row": rows.repeat(2)[::2]}),
+        "trace": ns.Measurement.from_trace(tmp_path / "scope.npz", samples=3, rows=rows, n=32),
+        "feed": fed,
+        "pickle": pickle.loads(pickle.dumps(in_memory)),
+        "part": ns.Measurement(y=y, rows=rows, n=32)[0],
+        "one of a file": ns.load(tmp_path / "two.npz", index=0),
+        "the first of all": ns.load(tmp_path / "two.npz", index="all")[0],
+    }
+    for door, measurement in doors.items():
+        assert measurement.most_noise == from_file.most_noise, door
+        assert (images(measurement) == expected).all(), door
+
+    stack = ns.load(tmp_path / "two.npz", index="all")
+    expected = images(stack)
+    assert stack.most_noise.shape == (2,) and stack.most_noise[1] > 2 * stack.most_noise[0]
+    without = ns.Measurement(d=stack.d, rows=rows, n=32)
+    assert (images(without) != expected).any()
+    in_memory = ns.Measurement(y=y, rows=rows, n=32)
+    in_memory.save(tmp_path / "both.npz")
+    doors = {
+        "memory": in_memory,
+        "axes": ns.Measurement(y=y.reshape(2, 1, -1), rows=rows, n=32),
+        "saved": ns.load(tmp_path / "both.npz", index="all"),
+        "all of it": in_memory[:],
+        "the file while it is read": tmp_path / "both.npz",
+    }
+    for door, given in doors.items():
+        options = {} if isinstance(given, ns.Measurement) else {"index": "all"}
+        assert (images(given, **options).reshape(expected.shape) == expected).all(), door
+    for file in ("two", "both"):
+        out = tmp_path / file
+        options = ["--index", "all", "--method", "tikhonov", "--out", out]
+        subprocess.run([cli, "reconstruct", tmp_path / f"{file}.npz", *options], check=True)
+        assert (np.load(out / "image.npy") == expected).all(), file
+
+
+def test_a_stack_has_the_noise_of_each_measurement(tmp_path, random):
+    scenes = np.stack([asymmetric(32, seed) for seed in range(3)])
+    d = ns.Hadamard(32, rows=ns.order("zig-zag", 32)[:300])(scenes) + random.normal(scale=20, size=(3, 300))
+    m = ns.Measurement(d=d, rows="zig-zag", n=32, noise=[20.0, np.nan, 5.0])
+    m.save(tmp_path / "m.npz")
+    every = ns.load(tmp_path / "m.npz", index="all")
+    assert np.array_equal(every.noise, m.noise, equal_nan=True)
+    assert (every[0].noise, every[1].noise, every[1:].noise[1]) == (20.0, None, 5.0)
+    images = ns.reconstruct(m, method="tikhonov")
+    for k, noise in enumerate([20.0, None, 5.0]):
+        one = ns.Measurement(d=d[k], rows="zig-zag", n=32, noise=noise)
+        assert (ns.reconstruct(one, method="tikhonov") == images[k]).all()
+        assert (ns.reconstruct(tmp_path / "m.npz", index=k, method="tikhonov") == images[k]).all()
+    by_path = ns.reconstruct(tmp_path / "m.npz", index="all", method="tikhonov")
+    assert (by_path == images).all()
+    # One number for all.
+    ns.Measurement(d=d, rows="zig-zag", n=32, noise=20.0).save(tmp_path / "same.npz")
+    same = ns.reconstruct(tmp_path / "same.npz", index="all", method="tikhonov")
+    assert (same[0] == images[0]).all() and (same[2] != images[2]).any()
+    for wrong, of in [(-1.0, "-1"), ([1.0, 2.0], "shape"), (np.inf, "inf"), ("loud", "holds")]:
+        with pytest.raises(ns.Error, match=of):
+            ns.Measurement(d=d, rows="zig-zag", n=32, noise=wrong)
 
 
 def test_all_on_readings_correct_a_lamp_that_drifts(tmp_path):

@@ -200,3 +200,19 @@ def test_a_computation_from_two_threads_at_once_gives_the_same():
     for thread in threads:
         thread.join()
     assert len(found) == 4 and all((found[k] == expected[k]).all() for k in found)
+
+
+def test_measurements_of_one_scene_tell_a_matrix_their_noise(random):
+    scene = np.add.outer(np.linspace(0, 1, 16), np.linspace(0, 2, 16))
+    matrix = (random.random((150, 256)) < 0.5).astype(float)
+    y = matrix @ scene.ravel() + 20 * random.normal(size=(3, 150))
+    images = ns.reconstruct(y, matrix=matrix, method="tikhonov")
+    alone = ns.reconstruct(y[0], matrix=matrix, method="tikhonov")
+    report = images[0].report
+    assert report["noise_from"] == "measurements of one scene"
+    assert report["noise_of_a_reading"] == pytest.approx(20, rel=0.15)
+    assert alone.report["noise_of_a_reading"] is None
+    assert np.abs(images[0] - scene).mean() < np.abs(alone - scene).mean()
+    # A method that does not weigh noise says nothing of it.
+    tv = ns.reconstruct(y, matrix=matrix, method="tv")
+    assert tv[0].report["noise_from"] is None

@@ -55,8 +55,8 @@ pub use methods::hadamard;
 pub use noise::estimated_noise;
 pub use own_atoms::omp_over;
 pub use own_matrix::{
-    DarkLevel, LiveMatrix, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings,
-    OwnMatrix,
+    DarkLevel, KnownNoise, LiveMatrix, MatrixError, MatrixMethod, MatrixReconstruction,
+    MatrixSettings, NoiseFrom, OwnMatrix,
 };
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};

@@ -100,7 +100,7 @@ impl Ready {
         let strength = settings.strength.map_or_else(Strength::default, Strength::Fixed);
         let base = MethodSettings { strength, ..base.clone() };
         let of_method = method.matrix_settings(&base)?;
-        let of_method = MatrixSettings { dark: plain.dark, ..of_method };
+        let of_method = MatrixSettings { dark: plain.dark, noise: plain.noise, ..of_method };
         let own = OwnMatrix::new(plain.patterns.size, &plain.patterns.select(&plain.places))?;
         Ok(Self {
             patterns: Arc::clone(&plain.patterns),
@@ -123,6 +123,7 @@ mod tests {
     use super::*;
     use nirspi::account::LossCounters;
     use nirspi::files::feed::Header;
+    use nirspi::provenance::Taken;
     use nirspi_recon::Size;
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
@@ -147,7 +148,8 @@ mod tests {
             values: places.iter().map(|&at| values[at]).collect(),
             places: places.to_vec(),
             not_read: Vec::new(),
-            simulated: None,
+            taken: Taken::simulated_or(None),
+            noise: None,
             notes: Vec::new(),
             dark: true,
         };

@@ -3,13 +3,13 @@
 use super::{ExportError, Whole};
 use crate::files::FileError;
 use crate::files::archive::write_members;
-use crate::files::measurement::{NOISE, PROVENANCE};
+use crate::files::measurement::{PROVENANCE, noise_of};
 use crate::files::npy::{Element, encode, encode_text, header};
 use crate::files::output::{Existing, write_in_pieces, write_result};
-use crate::provenance::Provenance;
+use crate::provenance::{Provenance, beside_array};
 use crate::source::Stamp;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Writes a `.npz` file.
 pub(super) fn npz(
@@ -25,8 +25,8 @@ pub(super) fn npz(
         zip.add("n", &encode(&[], &[rows.side().pixels() as i64]))?;
         zip.add("h_row", &encode(&[m], &h_row))?;
         zip.add("d", &encode(&[m], whole.source.measurements.values()))?;
-        if let Some(noise) = whole.source.measurements.noise() {
-            zip.add(NOISE, &encode(&[], &[noise]))?;
+        for (name, sigma) in noise_of(&whole.source.measurements) {
+            zip.add(name, &encode(&[], &[sigma]))?;
         }
         zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
         zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
@@ -50,7 +50,7 @@ pub(super) fn npy(
     existing: Existing<'_>,
     provenance: &Provenance,
 ) -> Result<(), ExportError> {
-    let beside = beside(out);
+    let beside = beside_array(out);
     existing.check(&beside)?;
     write_in_pieces(out, existing, |file| {
         frames(whole, |bytes| {
@@ -60,13 +60,6 @@ pub(super) fn npy(
     })?;
     let text = provenance.sign(&serde_json::json!({})).unwrap_or_default();
     Ok(write_result(&beside, existing, text.as_bytes())?)
-}
-
-/// The file with the provenance of an `.npy` file: the same name with `.json` after it.
-fn beside(out: &Path) -> PathBuf {
-    let mut name = out.as_os_str().to_owned();
-    name.push(".json");
-    name.into()
 }
 
 /// Hands out the bytes of a `.npy` file of all frames, piece by piece. Returns their numbers and times.
@@ -87,8 +80,7 @@ fn frames(
 }
 
 /// Writes the mean of all frames, one pattern a line, under the heading `n,h_row,d,noise`, without
-/// `noise` if that is not known. The numbers
-/// read back as they were. Comments before the heading have the provenance.
+/// `noise` if that is not known. The numbers read back as they were. Comments before the heading have the provenance.
 pub(super) fn csv(
     whole: &Whole<'_>,
     out: &Path,
@@ -106,11 +98,11 @@ pub(super) fn csv(
             // Such as that the mean is one of the newest frames alone.
             whole.source.notes.iter().try_for_each(|note| writeln!(file, "# note: {note}"))?;
             // The noise of `d` is the same for all.
-            let noise = measurements.noise().map(|noise| format!(",{noise:?}"));
-            let (heading, noise) = match &noise {
-                Some(noise) => ("n,h_row,d,noise", noise.as_str()),
-                None => ("n,h_row,d", ""),
-            };
+            let (mut heading, mut noise) = ("n,h_row,d".to_owned(), String::new());
+            for (name, sigma) in noise_of(measurements) {
+                heading += &format!(",{name}");
+                noise += &format!(",{sigma:?}");
+            }
             writeln!(file, "{heading}")?;
             // A point shows that commas separate numbers.
             lines.into_iter().try_for_each(|(row, d)| writeln!(file, "{n},{row},{d:?}{noise}"))

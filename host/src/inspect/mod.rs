@@ -201,7 +201,7 @@ impl Inspection {
     fn examined(path: &Path, mut contents: Contents) -> Self {
         let mut notes: Vec<String> = contents.skipped().map(str::to_owned).into_iter().collect();
         notes.extend(contents.decimal_comma().then(|| "each comma is a decimal comma".to_owned()));
-        let taken = Taken::of_file(path, contents.simulated());
+        let taken = contents.taken();
         let judge = Judge::new();
         let mut findings = other::patterns(path, &contents);
         let traces = other::traces(path, &mut contents);

@@ -10,12 +10,13 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Fields that are no readings.
-pub(super) const NO_READINGS: [&str; 12] = [
+pub(super) const NO_READINGS: [&str; 13] = [
     "n",
     "h_row",
     "sign",
     "simulated",
     "noise",
+    "most_noise",
     "recon",
     "image",
     "images",

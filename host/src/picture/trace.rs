@@ -46,6 +46,7 @@ pub fn of_trace(found: &Found, footer: String) -> Chart {
 mod tests {
     use super::*;
     use crate::files::trace::First;
+    use crate::provenance::Taken;
 
     #[test]
     fn readings_and_edges_stand_where_they_were_found() {
@@ -66,6 +67,7 @@ mod tests {
             overloads: Vec::new(),
             cut_off: None,
             skipped: None,
+            taken: Taken::simulated_or(None),
             first,
         };
         let chart = of_trace(&found, String::new());

@@ -7,11 +7,11 @@ use crate::files::FileError;
 use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain, read_plain_all};
 use crate::files::output::OutputDir;
 use crate::picture::{FigureStyle, Pictures, Unit};
-use crate::provenance::{self, Taken};
+use crate::provenance;
 use crate::stage_times::StageTimes;
 use nirspi_recon::reconstruct::{
-    DarkLevel, MatrixError, MatrixReconstruction, MatrixSettings, Method, MethodSettings,
-    OwnMatrix, Setting, Sparsity,
+    DarkLevel, KnownNoise, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, Method,
+    MethodSettings, NoiseFrom, OwnMatrix, Penalty, Setting, Sparsity,
 };
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Sampling, Size};
@@ -116,6 +116,12 @@ pub struct OwnMade {
     /// The reading without light that was fitted with the image, if there was to be one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dark_level: Option<f64>,
+    /// Standard deviation of the noise of a reading, where it is known and says how much readings count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_of_a_reading: Option<f64>,
+    /// What says how large that noise is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_from: Option<&'static str>,
     /// Norm of the residual, relative to the norm of the readings without the dark level.
     pub relative_residual: f64,
     /// Patterns that the file marks as not read.
@@ -149,7 +155,8 @@ pub enum OwnError {
 }
 
 /// Reconstructs one image, or the image of every measurement of the file as one stack, and writes it with
-/// its pictures and its report. An image of a stack is the one that its measurement alone gives.
+/// its pictures and its report. An image of a stack is the one that its measurement alone gives, if that knows as much of its
+/// noise.
 ///
 /// # Errors
 /// [`OwnError`] names the file and the problem. Nothing is left behind.
@@ -160,7 +167,7 @@ pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnRepo
         false => Ok(vec![read_plain(matrix, patterns, input, readings)?]),
     };
     let plain = times.time("read", read)?;
-    let provenance = Taken::of_file(input, plain[0].simulated).made(request.made);
+    let provenance = plain[0].taken.clone().from_file(input).made(request.made);
     let (of, all) = images(&request, plain, &mut times)?;
     let (mut images, mut frames): (Vec<Image<Size>>, Vec<OwnMade>) = all.into_iter().unzip();
     if !request.all {
@@ -224,6 +231,7 @@ fn images(
         let alike = |at: &usize| {
             Arc::ptr_eq(&plain[*at].patterns, &plain[first].patterns)
                 && plain[*at].places == plain[first].places
+                && plain[*at].noise == plain[first].noise
         };
         let all: Vec<usize> = (first..plain.len()).filter(alike).collect();
         settings.dark = request.settings.dark && plain[first].dark;
@@ -250,6 +258,12 @@ fn same(
     let own = times.time("rank", || OwnMatrix::new(patterns.size, &kept)).map_err(refused)?;
     drop(kept);
     let readings: Vec<&[f64]> = all.iter().map(|&at| &plain[at].values[..used]).collect();
+    let known = match (plain[all[0]].noise, own.weighs_noise(settings)) {
+        (_, false) => None,
+        (Some(sigma), true) => Some(KnownNoise { sigma, from: NoiseFrom::Stated }),
+        (None, true) => own.known_noise(&readings),
+    };
+    let settings = &MatrixSettings { noise: known.map(|known| known.sigma), ..settings.clone() };
     let solve = || own.reconstruct_all(&readings, settings);
     let found = times.time("reconstruct", solve).map_err(refused)?;
     let basis = match request.dictionary {
@@ -266,6 +280,7 @@ fn same(
         notes.extend(doubts.iter().cloned());
         notes.extend(found.dark.note().map(str::to_owned));
         let method = Method::of_matrix(found.method).unwrap_or_default();
+        let weighed = known.filter(|_| found.method == MatrixMethod::Penalty(Penalty::Tikhonov));
         let made = OwnMade {
             used,
             rank: own.rank(),
@@ -276,6 +291,8 @@ fn same(
             sparsity: found.atoms.map(|(size, _)| size),
             stop: found.atoms.map(|(_, stop)| asked.reason(stop)),
             dark_level: (found.dark != DarkLevel::LeftOut).then_some(found.dark.value()),
+            noise_of_a_reading: weighed.map(|known| known.sigma),
+            noise_from: weighed.map(|known| known.from.name()),
             relative_residual: found.residual,
             not_read: not_read.clone(),
             notes,
@@ -304,8 +321,12 @@ impl OwnMade {
         let basis = self.basis.as_ref().map(|b| format!(", {b} basis")).unwrap_or_default();
         let dark =
             self.dark_level.map(|level| format!(", dark level {level:.4}")).unwrap_or_default();
+        let noise = self.noise_of_a_reading.zip(self.noise_from);
+        let noise = noise
+            .map(|(sigma, from)| format!(", noise of a reading {sigma:.4} ({from})"))
+            .unwrap_or_default();
         let (method, residual) = (self.method.name(), self.relative_residual);
-        format!("{method}{basis}{atoms}{strength}{dark}, relative residual {residual:.3}")
+        format!("{method}{basis}{atoms}{strength}{dark}{noise}, relative residual {residual:.3}")
     }
 }
 

@@ -323,17 +323,19 @@ struct Origin {
     taken: Taken,
     /// Whether all are of this file, so that all that is known of it holds for all.
     is_one_file: bool,
+    is_one_camera: bool,
     is_alike: bool,
 }
 
 impl Origin {
     fn of(first: &FileImage) -> Self {
         let (file, taken) = (first.file.clone(), first.taken.clone());
-        Self { file, taken, is_one_file: true, is_alike: true }
+        Self { file, taken, is_one_file: true, is_one_camera: true, is_alike: true }
     }
 
     fn add(&mut self, image: &FileImage) {
         self.is_one_file &= image.file == self.file;
+        self.is_one_camera &= image.taken.camera == self.taken.camera;
         self.is_alike &= image.taken.simulated() == self.taken.simulated();
     }
 
@@ -341,7 +343,10 @@ impl Origin {
     fn taken(&self, named: &Path) -> Taken {
         match self.is_one_file {
             true => self.taken.clone(),
-            false => Taken::of_file(named, self.taken.simulated().filter(|_| self.is_alike)),
+            false => Taken {
+                camera: self.taken.camera.clone().filter(|_| self.is_one_camera),
+                ..Taken::of_file(named, self.taken.simulated().filter(|_| self.is_alike))
+            },
         }
     }
 }

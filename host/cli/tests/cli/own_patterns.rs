@@ -392,6 +392,51 @@ fn all_measurements_of_a_file_become_one_stack() {
         .failed(1, &["gone.npy", "is NaN everywhere in measurement 1"]);
 }
 
+/// Measurements of one scene, patterns that are shown again, and a file that states its noise.
+#[test]
+fn a_known_noise_is_used_and_told() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let (mut weights, mut y) = own_patterns(&measured, 150);
+    let mut random = 7_u32;
+    let mut noise = |y: &f32| {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        y + 8.0 * ((random >> 8) as f32 / (1 << 24) as f32 - 0.5) * 12.0_f32.sqrt()
+    };
+    let frames: Vec<f32> =
+        (0..4).flat_map(|_| y.iter().map(&mut noise).collect::<Vec<_>>()).collect();
+    bench.write("phi.npy", &npy::encode(&[150, 256], &weights));
+    bench.write("y.npy", &npy::encode(&[4, 150], &frames));
+    bench.write("d.npz", &npz(&[("d", &[150], &frames[..150]), ("noise", &[], &[8.0])]));
+    // The first ten patterns once more.
+    weights.extend_from_within(..10 * 256);
+    y.extend_from_within(..10);
+    let again: Vec<f32> = y.iter().map(&mut noise).collect();
+    bench.write("again.npy", &npy::encode(&[160, 256], &weights));
+    bench.write("y160.npy", &npy::encode(&[160], &again));
+    let report = |input: &str, matrix: &str, more: &[&str]| {
+        let line = ["reconstruct", input, "--matrix", matrix, "--method", "tikhonov"];
+        let said = bench.run(&[&line, more].concat()).succeeded().stdout;
+        let report = bench.json("out/report.json");
+        let made = report["frames"].as_array().map_or(&report, |frames| &frames[0]).clone();
+        std::fs::remove_dir_all(bench.path("out")).unwrap();
+        let told = made["noise_from"].as_str().unwrap_or("nothing").to_owned();
+        assert_eq!(said.contains("noise of a reading"), told != "nothing", "{said}");
+        (told, made["noise_of_a_reading"].as_f64().unwrap_or_default(), made["strength"].as_f64())
+    };
+    let (from, of_scene, strength) = report("y.npy", "phi.npy", &["--index", "all"]);
+    assert_eq!(from, "measurements of one scene");
+    assert!((of_scene - 8.0).abs() < 0.8, "{of_scene}");
+    let (from, sigma, alone) = report("y.npy", "phi.npy", &["--index", "0"]);
+    assert_eq!((from.as_str(), sigma), ("nothing", 0.0));
+    // The likeliest strength, beside that of held-back readings.
+    assert_ne!(strength, alone);
+    let (from, sigma, _) = report("d.npz", "phi.npy", &[]);
+    assert_eq!((from.as_str(), sigma), ("stated with the readings", 8.0));
+    let (from, of_patterns, _) = report("y160.npy", "again.npy", &[]);
+    assert_eq!(from, "patterns shown several times");
+    assert!((of_patterns - 8.0).abs() < 4.5, "{of_patterns}");
+}
+
 /// The complement of a pattern lights what the pattern leaves dark.
 #[test]
 fn pattern_and_complement_give_differences() {

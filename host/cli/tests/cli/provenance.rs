@@ -142,9 +142,24 @@ fn pictures_and_reports_of_a_recording_name_its_camera() {
     for file in ["npz/rec.npz", "csv/rec.csv", "mcap/rec.mcap"] {
         let file = format!("exported/{file}");
         let said = run(&bench, &["reconstruct", &file, "--out", "again", "--json"]);
-        let origin = if file.ends_with("csv") { Origin::Unknown } else { SIMULATED };
-        says(said, origin, "reconstruct");
+        let said = says(said, SIMULATED, "reconstruct");
+        assert_eq!(said.taken.camera.as_ref(), Some(&camera), "{file}");
+        assert_eq!(said.taken.file.as_deref(), file.rsplit('/').next());
     }
+    // One frame of an array, whose provenance is in a file beside it.
+    let npy = ["reconstruct", "exported/npy/rec.npy", "--index", "3", "--readings", "differences"];
+    let npy = [&npy[..], &["--shown", "cake-cutting", "--side", "32", "--out", "again", "--json"]]
+        .concat();
+    let said = says(run(&bench, &npy), SIMULATED, "reconstruct");
+    assert_eq!(said.taken.camera.as_ref(), Some(&camera));
+    // Samples of a trace, and the readings that were made of them.
+    let readings = ["readings", "exported/npz/rec.npz", "--field", "d", "--samples", "2"];
+    let readings = [&readings[..], &["--out", "trace/m.npz", "--json"]].concat();
+    fs::create_dir_all(bench.path("trace")).unwrap();
+    let said = says(run(&bench, &readings), SIMULATED, "readings");
+    assert_eq!(said.taken.camera.as_ref(), Some(&camera));
+    all_are_signed(&bench, "trace", 5, SIMULATED, "readings");
+    assert_eq!(of_npz(&bench.path("trace/m.npz")).taken.camera, Some(camera));
 }
 
 #[test]

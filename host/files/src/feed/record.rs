@@ -270,7 +270,7 @@ mod tests {
                 _ => Readings::Differential(vec![5.0, 6.0]),
             };
             assert_eq!((found.readings, found.claim.form.name()), (expected, form));
-            assert_eq!((&*found.h_row, found.simulated), (&[0, 3][..], Some(true)));
+            assert_eq!((&*found.h_row, found.taken.simulated()), (&[0, 3][..], Some(true)));
             // What the user says beats what the file says.
             let form = Some(Form::Single);
             if header.form == Form::Halves {

@@ -1,16 +1,16 @@
 //! An open file whose shapes fit together, and its measurements one by one.
 
 use super::called::called;
+use super::noise::{Deviations, MOST_NOISE, NOISE};
 use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
 use super::reference::read_reference;
 use super::remedy::all_on;
 use super::rows::{Shown, read_rows, read_side, repeats, shown, side_of_pixels};
 use super::sides::make_pairs;
-use super::{
-    FileError, Form, MeasurementFile, NOISE, READINGS, Readings, Reference, Remedy, Selection,
-};
+use super::{FileError, Form, MeasurementFile, READINGS, Readings, Reference, Remedy, Selection};
 use crate::field::Field;
 use crate::fields::Fields;
+use crate::provenance::Taken;
 use nirspi_recon::law::{Claim, LampReadings, OVERLOAD};
 use nirspi_recon::{Image, Rows, Side};
 use std::path::Path;
@@ -28,8 +28,10 @@ pub(super) struct Opened {
     pub(super) side_guessed: bool,
     pub(super) readings: NamedReadings,
     reference: Option<(Field, usize)>,
-    pub(super) simulated: Option<bool>,
-    noise: Option<f64>,
+    /// Where the numbers come from, without the name of the file.
+    pub(super) taken: Taken,
+    pub(super) noise: Deviations,
+    pub(super) most_noise: Deviations,
     pub(super) notes: Vec<String>,
 }
 
@@ -106,8 +108,13 @@ impl Opened {
                 notes.push(format!("not compared with the reconstruction in the file: {error}"));
                 None
             });
-        let simulated = read_simulated(&mut fields);
-        let noise = is_d.then(|| read_noise(&mut fields)).flatten();
+        let taken = fields.taken();
+        // What is said of the noise is said of differences.
+        let mut said = |name| match is_d {
+            true => Deviations::read(&mut fields, name, readings.layout.count),
+            false => Deviations::default(),
+        };
+        let (noise, most_noise) = (said(NOISE), said(MOST_NOISE));
         // Rows that were shown several times are no list of rows.
         let every_row: Option<Vec<u32>> = rows.iter().copied().collect();
         let every_row = every_row.and_then(|rows| Rows::new(side, rows).ok());
@@ -121,8 +128,9 @@ impl Opened {
             side_guessed,
             readings,
             reference,
-            simulated,
+            taken,
             noise,
+            most_noise,
             notes,
         })
     }
@@ -265,8 +273,9 @@ impl Loaded<'_> {
             remedy: opened.remedy,
             patterns: count,
             reference: opened.reference(index),
-            simulated: opened.simulated,
-            noise: opened.noise,
+            taken: opened.taken.clone(),
+            noise: opened.noise.of(index),
+            most_noise: opened.most_noise.of(index),
             notes: opened.notes.clone(),
         })
     }
@@ -295,15 +304,6 @@ pub(crate) fn is_reading(value: f64) -> bool {
 /// The form that the file states for `y`. A field of another kind says nothing.
 pub(super) fn stated_form(fields: &mut Fields) -> Option<Form> {
     fields.text(READINGS)?.parse().ok()
-}
-
-/// The noise that the file states for `d`. A field of another kind says nothing.
-fn read_noise(fields: &mut Fields) -> Option<f64> {
-    if fields.is_unnamed() || !fields.holds(NOISE) {
-        return None;
-    }
-    let noise = *fields.read(NOISE, |_| Ok(())).ok()?.real.first()?;
-    (noise.is_finite() && noise >= 0.0).then_some(noise)
 }
 
 /// Whether the file says that no real light was measured. A field of another kind says nothing.

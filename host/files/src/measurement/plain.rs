@@ -4,7 +4,8 @@ use super::axes::joined;
 use super::called::called;
 use super::layout::Layout;
 use super::named::{NamedPatterns, read_fourier};
-use super::opened::{is_reading, read_simulated, stated_form};
+use super::noise::{Deviations, NOISE};
+use super::opened::{is_reading, stated_form};
 use super::patterns::{PatternArray, PatternSelection, Patterns};
 use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings_field};
 use super::sides::{make_pairs, two_fields};
@@ -13,6 +14,7 @@ use super::{FileError, Form, Selection};
 use crate::array::has_shape;
 use crate::field::Field;
 use crate::fields::Fields;
+use crate::provenance::Taken;
 use nirspi_recon::Size;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -93,7 +95,7 @@ pub struct PlainSweeps {
     origin: PathBuf,
     patterns: Arc<Patterns>,
     form: Form,
-    simulated: Option<bool>,
+    taken: Taken,
 }
 
 impl PlainSweeps {
@@ -132,7 +134,8 @@ impl PlainSweeps {
             }
         };
         let patterns = weighing(patterns, form);
-        Ok(Self { origin: origin.to_owned(), patterns, form, simulated })
+        let taken = Taken::simulated_or(simulated);
+        Ok(Self { origin: origin.to_owned(), patterns, form, taken })
     }
 
     /// The readings of one sweep. NaN: the pattern was not read.
@@ -145,7 +148,7 @@ impl PlainSweeps {
         let fields = Fields::of_fields(&self.origin, vec![(name.to_owned(), readings)]);
         let want = Selection { form: Some(self.form), ..Selection::default() };
         let numbers = numbers_of(fields, &want, Which::One, self.patterns.count)?;
-        let numbers = Numbers { simulated: self.simulated, ..numbers };
+        let numbers = Numbers { taken: self.taken.clone(), ..numbers };
         Ok(numbers.plain(&self.patterns).remove(0))
     }
 }
@@ -154,8 +157,10 @@ impl PlainSweeps {
 struct Numbers {
     /// Of each measurement: at least one.
     all: Vec<Vec<f64>>,
+    /// What the file says of the noise of each.
+    noise: Vec<Option<f64>>,
     form: Form,
-    simulated: Option<bool>,
+    taken: Taken,
     notes: Vec<String>,
 }
 
@@ -169,15 +174,15 @@ fn weighing(patterns: Patterns, form: Form) -> Arc<Patterns> {
 
 impl Numbers {
     fn plain(self, patterns: &Arc<Patterns>) -> Vec<Plain> {
-        let Self { all, simulated, notes, .. } = self;
-        let plain = |all: Vec<f64>| {
+        let Self { all, noise, taken, notes, .. } = self;
+        let plain = |(all, noise): (Vec<f64>, Option<f64>)| {
             let (places, not_read): (Vec<usize>, Vec<usize>) =
                 (0..all.len()).partition(|&k| is_reading(all[k]));
             let values = places.iter().map(|&k| all[k]).collect();
-            let (patterns, notes) = (Arc::clone(patterns), notes.clone());
-            Plain { patterns, values, places, not_read, simulated, notes, dark: true }
+            let (patterns, taken, notes) = (Arc::clone(patterns), taken.clone(), notes.clone());
+            Plain { patterns, values, places, not_read, taken, noise, notes, dark: true }
         };
-        all.into_iter().map(plain).collect()
+        all.into_iter().zip(noise).map(plain).collect()
     }
 }
 
@@ -222,6 +227,10 @@ fn numbers_of(
     }
     let mut readings = NamedReadings::open(&mut fields, name, want, &expected)?;
     let layout = readings.layout;
+    let noise = match readings.name == "d" {
+        true => Deviations::read(&mut fields, NOISE, layout.count),
+        false => Deviations::default(),
+    };
     let numbers = readings.numbers(&mut fields)?;
     let refused =
         |found: &str, expected| FileError::field(path, readings.name.clone(), found, expected);
@@ -240,6 +249,7 @@ fn numbers_of(
             true => pattern - complement,
             false => f64::NAN,
         };
+    let noise = indices.clone().map(|index| noise.of(index)).collect();
     let mut all = Vec::with_capacity(indices.len());
     for index in indices {
         let values = layout.series(&numbers.real, index);
@@ -263,7 +273,7 @@ fn numbers_of(
     if form.readings() == 2 {
         notes.push("the image is that of pattern minus complement".to_owned());
     }
-    Ok(Numbers { all, form, simulated: read_simulated(&mut fields), notes })
+    Ok(Numbers { all, noise, form, taken: fields.taken(), notes })
 }
 
 /// Pairs if pattern and complement are on a last axis of two, else one reading a pattern.

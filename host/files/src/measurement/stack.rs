@@ -7,6 +7,7 @@
 use super::opened::{Opened, is_reading};
 use super::readings::check_infinite;
 use super::{FileError, Form, Remedy};
+use crate::provenance::Taken;
 use crate::stored::Stored;
 use nirspi_recon::law::keeps_the_law;
 use nirspi_recon::{Rows, Side};
@@ -77,10 +78,17 @@ impl<'o> Stack<'o> {
             .map(|i| i.concat())
     }
 
-    /// Whether the file says that no real light was measured; `None` if it does not say.
+    /// Where the numbers come from, without the name of the file.
     #[must_use]
-    pub fn simulated(&self) -> Option<bool> {
-        self.opened.simulated
+    pub fn taken(&self) -> &Taken {
+        &self.opened.taken
+    }
+
+    /// Standard deviation of the noise of a difference of the measurement of this index, and what it is at most, if the
+    /// file says so.
+    #[must_use]
+    pub fn noise(&self, index: usize) -> [Option<f64>; 2] {
+        [&self.opened.noise, &self.opened.most_noise].map(|said| said.of(index))
     }
 
     /// Oddities of the file that do not make it unusable, one line each.

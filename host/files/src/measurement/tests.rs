@@ -1,5 +1,6 @@
 mod shapes;
 mod stack;
+mod taken;
 
 use super::super::testing::{Zip, file, line, npy, npy_f64, npy_i32, zip};
 use super::*;

@@ -1,6 +1,7 @@
 //! Readings with the weights of their patterns, which are a user's own.
 
 use super::patterns::Patterns;
+use crate::provenance::Taken;
 use std::sync::Arc;
 
 /// Readings of patterns of a user's own.
@@ -14,8 +15,10 @@ pub struct Plain {
     pub places: Vec<usize>,
     /// Patterns that were not read: the file has NaN, or an instrument's word for overload.
     pub not_read: Vec<usize>,
-    /// Whether the file says that no real light was measured; `None` if it does not say.
-    pub simulated: Option<bool>,
+    /// Where the readings come from, without the name of the file.
+    pub taken: Taken,
+    /// Standard deviation of the noise of a value, if the file says so.
+    pub noise: Option<f64>,
     /// What people may not expect, one line each.
     pub notes: Vec<String>,
     /// Whether the values may hold a constant dark level.

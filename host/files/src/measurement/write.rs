@@ -1,6 +1,7 @@
 //! Writes measurements of nirspi as a file for other programs: NumPy `.npz`.
 
 use super::FileError;
+use super::noise::{MOST_NOISE, NOISE};
 use crate::npy::Element;
 use crate::output::Existing;
 use crate::provenance::Provenance;
@@ -14,14 +15,11 @@ pub const PROVENANCE: &str = "provenance";
 /// The field of an `.npz` file with the form of `y`, as text.
 pub(crate) const READINGS: &str = "readings";
 
-/// The field with the standard deviation of the noise of `d`, if it is known.
-pub const NOISE: &str = "noise";
-
 /// Readings that are encoded at a time.
 const PIECE: usize = 1 << 13;
 
-/// The bytes of a `.npz` file with `n`, `h_row`, `d`, its `noise` if that is known, and the provenance as
-/// JSON text. `simulated` is 1 if no real light was measured, and is left out if that is not known.
+/// The bytes of a `.npz` file with `n`, `h_row`, `d`, its `noise` and what that is at most, if they are known, and the
+/// provenance as JSON text. `simulated` is 1 if no real light was measured, and is left out if that is not known.
 ///
 /// # Errors
 /// [`FileError`] naming `path`, if the archive cannot be written.
@@ -39,9 +37,15 @@ pub fn encode(
         (PROVENANCE, npy::encode_text(&provenance.json())),
     ];
     let simulated = provenance.taken.simulated();
-    members.extend(measurements.noise().map(|noise| (NOISE, npy::encode(&[], &[noise]))));
+    members.extend(noise_of(measurements).map(|(name, sigma)| (name, npy::encode(&[], &[sigma]))));
     members.extend(simulated.map(|s| ("simulated", npy::encode(&[], &[i64::from(s)]))));
     archive::encode(path, &members)
+}
+
+/// The fields with what is known of the noise of measurements.
+pub fn noise_of(measurements: &Measurements) -> impl Iterator<Item = (&'static str, f64)> {
+    let known = measurements.noise().map(|noise| (NOISE, noise));
+    known.into_iter().chain(measurements.most_noise().map(|most| (MOST_NOISE, most)))
 }
 
 /// Writes readings of patterns that the file does not name to a `.npz` file, whole or not at all: `y`, and the provenance as

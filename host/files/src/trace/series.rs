@@ -9,9 +9,10 @@ use super::{FileError, Raw};
 use crate::archive::Archive;
 use crate::array::{ArrayError, Header, MAGIC, Take};
 use crate::field::EXPECTED as MEASUREMENTS;
-use crate::fields::{Fields, UNNAMED};
+use crate::fields::{Fields, UNNAMED, stated_beside};
 use crate::npy;
 use crate::plain::open_start;
+use crate::provenance::Taken;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -118,6 +119,18 @@ impl Series {
             Form::Other(fields) => fields.skipped(),
             _ => None,
         }
+    }
+
+    /// Where the samples come from, by what the file says of it, without the name of the file.
+    pub(super) fn taken(&mut self) -> Taken {
+        let stated = match &mut self.form {
+            Form::Other(fields) => Some(fields.taken()),
+            // Opening an archive reads no array.
+            Form::Npz(_) => Fields::open(&self.path, false).ok().map(|mut fields| fields.taken()),
+            Form::Npy => stated_beside(&self.path),
+            Form::Raw(_) => None,
+        };
+        stated.unwrap_or_else(|| Taken::simulated_or(None))
     }
 
     /// Number of samples of a field.

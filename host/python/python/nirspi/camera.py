@@ -122,7 +122,8 @@ class Frames(Iterator[Frame]):
         if not frames:
             raise Error("frames is empty, expected at least one frame")
         sums = np.concatenate([frame.sums for frame in frames], dtype=np.int64)
-        return _measurement(self._run.readings(sums, [frame.sweeps for frame in frames]))
+        readings = self._run.readings(sums, [frame.sweeps for frame in frames])
+        return _measurement(readings, self._camera._camera.taken)
 
     def close(self) -> None:
         """Ends the run; the LEDs are off."""
@@ -375,7 +376,7 @@ class Camera:
 
     def _measurement(self, run: Any) -> Measurement:
         readings, notes = run.measurement()
-        made = _measurement(readings)
+        made = _measurement(readings, self._camera.taken)
         made.frames, made.notes = self.account, notes
         return made
 
@@ -405,10 +406,12 @@ class Camera:
         self.close()
 
 
-def _measurement(readings: Any) -> Measurement:
+def _measurement(readings: Any, taken: str) -> Measurement:
     """The measurement of what the library made of frames."""
     n, rows, d, noise, flat = readings
-    return Measurement(d=d, rows=rows, n=n, unit="ADC counts", flat_field=flat, noise=noise)
+    made = Measurement(d=d, rows=rows, n=n, unit="ADC counts", flat_field=flat, noise=noise)
+    made.origin = json.loads(taken)
+    return made
 
 
 def _small(value: Any, name: str, most: int) -> int | None:

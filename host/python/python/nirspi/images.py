@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ class Image(np.ndarray):
         The Hadamard rows that were used.
     warnings : list of str
         Reasons not to trust the image.
+    origin : dict or None
+        Where the readings come from, as in ``Measurement.origin``. Pictures say so.
 
     Examples
     --------
@@ -49,6 +52,7 @@ class Image(np.ndarray):
     unit: str
     rows: Any
     warnings: list[str]
+    origin: Any
     # What the networks get of each image: fingerprints of the images as shown, and other pixels.
     _networks: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -60,10 +64,11 @@ class Image(np.ndarray):
         unit: str = UNITS[0],
         rows: Any = None,
         warnings: list[str] | None = None,
+        origin: Any = None,
     ) -> Image:
         image = np.asarray(values, dtype=np.float32).view(cls)
         image.report, image.unit, image.rows = report, unit, rows
-        image.warnings = list(warnings or [])
+        image.warnings, image.origin = list(warnings or []), origin
         return image
 
     def __array_finalize__(self, source: Any) -> None:
@@ -71,6 +76,7 @@ class Image(np.ndarray):
         self.unit = getattr(source, "unit", UNITS[0])
         self.rows = getattr(source, "rows", None)
         self.warnings = getattr(source, "warnings", [])
+        self.origin = getattr(source, "origin", None)
         self._networks = getattr(source, "_networks", None)
 
     def _for(self, pixels: np.ndarray) -> Image:
@@ -114,12 +120,12 @@ class Image(np.ndarray):
 
     def __reduce__(self) -> Any:
         make, arguments, state = tuple(super().__reduce__())
-        kept = (self.report, self.unit, self.rows, self.warnings, self._networks)
+        kept = (self.report, self.unit, self.rows, self.warnings, self.origin, self._networks)
         return make, arguments, (state, kept)
 
     def __setstate__(self, state: Any) -> None:
         super().__setstate__(state[0])
-        self.report, self.unit, self.rows, self.warnings, self._networks = state[1]
+        self.report, self.unit, self.rows, self.warnings, self.origin, self._networks = state[1]
 
     def facts(self) -> str:
         """One line about how the image was made."""
@@ -138,13 +144,16 @@ class Image(np.ndarray):
             The line above the image.
         """
         values = np.ascontiguousarray(self, dtype=np.float32)
+        taken = None if self.origin is None else json.dumps(self.origin)
         if values.ndim == 2:
             size = (values.shape[1], values.shape[0])
             facts = [self.facts()] if self.facts() else []
-            return _nirspi.picture(values.reshape(-1), size, title, self.unit, facts, list(self.warnings))
+            warnings = list(self.warnings)
+            return _nirspi.picture(values.reshape(-1), size, title, self.unit, facts, warnings, taken)
         if values.shape[-1] != values.shape[-2]:
             raise _nirspi.Error(f"a stack of shape {self.shape}, expected square images: draw images[k]")
-        return _nirspi.sheet(values.reshape(-1), values.shape[-1], title or self.facts(), self.unit)
+        header = title or self.facts()
+        return _nirspi.sheet(values.reshape(-1), values.shape[-1], header, self.unit, taken)
 
     def _repr_png_(self) -> bytes | None:
         stack = self.ndim > 2 and self.shape[-1] != self.shape[-2]

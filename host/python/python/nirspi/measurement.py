@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import tempfile
 import warnings
@@ -43,12 +44,13 @@ class Measurement:
         Whether ``d`` is copied. Without a copy, later changes of the array change the measurement.
     unit : str
         Unit of the readings, for pictures.
-    noise : float, optional
-        Standard deviation of the noise of a value of ``d``, the same for all. :func:`reconstruct`
-        weights each reading by it, and estimates it if it is not given.
-    most_noise : float, optional
-        What this noise is at most, where it is estimated. :func:`load` finds it of patterns with
-        their complements, whose sums change by noise alone.
+    noise : float or array_like, (...,), optional
+        Standard deviation of the noise of a value of ``d``, the same for all patterns: one number, or
+        one for each measurement; NaN: not known. :func:`reconstruct` weights each reading by it, and
+        estimates it if it is not known.
+    most_noise : float or array_like, (...,), optional
+        What this noise is at most, where it is estimated. Of ``y`` that are patterns with their
+        complements it is found, as by :func:`load`: their sums change by noise alone.
 
     Attributes
     ----------
@@ -64,6 +66,9 @@ class Measurement:
     frames : Account or None
         The account of a recording's frames.
     notes : list of str
+    origin : dict or None
+        Where the readings come from, where that is known: ``origin`` ("simulated", "measured"),
+        ``camera`` with its serial and versions, ``file``. Images, pictures and saved files keep it.
 
     Examples
     --------
@@ -90,8 +95,9 @@ class Measurement:
     frames: Any = None
     notes: list[str] = field(default_factory=list)
     flat_field: Any = field(default=None, repr=False)
-    noise: float | None = None
-    most_noise: float | None = None
+    noise: Any = None
+    most_noise: Any = None
+    origin: Any = field(default=None, repr=False)
 
     def __post_init__(self, y: Any, readings: str, transpose: bool, copy: bool) -> None:
         if (self.d is None) == (y is None):
@@ -103,8 +109,6 @@ class Measurement:
         if self.n is None:
             raise Error("no n, expected the side of the image")
         self.n = _arrays.side(self.n)
-        if self.noise is not None and not 0 <= self.noise < np.inf:
-            raise Error(f"noise is {self.noise}, expected a standard deviation of 0 or more")
         if self.rows is None:
             raise Error("no rows, expected Hadamard rows or the name of an order")
         named = isinstance(self.rows, str)
@@ -128,6 +132,8 @@ class Measurement:
             )
         kept = rows >= 0
         self.not_read = np.flatnonzero(~kept) if self.not_read is None else self.not_read
+        self.noise = _deviations(self.noise, "noise", values.shape[:-1])
+        self.most_noise = _deviations(self.most_noise, "most_noise", values.shape[:-1])
         if y is not None:
             self._of_readings(values, rows, form)
         else:
@@ -156,12 +162,13 @@ class Measurement:
         else:
             pairs = values.reshape(-1, count, each)
         found = np.full((len(pairs), count), np.nan)
+        most_noise = np.full(len(pairs), np.nan)
         for frame, one in enumerate(pairs):
             read = (rows >= 0) & ~np.isnan(one).any(axis=1)
             if not read.any():
                 raise Error("y has no pattern that was read, expected at least one")
             shown = np.ascontiguousarray(rows[read])
-            kept, d, lost, notes = _nirspi.readings(
+            kept, d, most, lost, notes = _nirspi.readings(
                 self.n,
                 shown,
                 np.ascontiguousarray(one[read]).reshape(-1),
@@ -169,11 +176,14 @@ class Measurement:
             )
             at = np.flatnonzero(read)[np.isin(shown, kept)]
             found[frame, at] = d
+            most_noise[frame] = np.nan if most is None else most
             self.dropouts.append(lost)
             self.notes.extend(note for note in notes if note not in self.notes)
         shown = rows >= 0
         self.rows = rows[shown]
         self.d = found[:, shown].reshape(*values.shape[:-1], int(shown.sum()))
+        if self.most_noise is None:
+            self.most_noise = _known(most_noise.reshape(values.shape[:-1]))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -192,10 +202,17 @@ class Measurement:
         part = self.d[index]
         if part.ndim < 1 or part.shape[-1] != self.d.shape[-1]:
             raise IndexError("an index into the patterns, expected one of measurements")
+
+        def of(name: str) -> Any:
+            said = getattr(self, name)
+            if said is None or np.ndim(said) == 0:
+                return said
+            return np.broadcast_to(said[..., np.newaxis], self.d.shape)[index][..., 0]
+
         dropouts = self.dropouts
         if isinstance(index, (int, np.integer)) and len(dropouts) == len(self.d):
             dropouts = [dropouts[index]]
-        return self._with(d=part, dropouts=dropouts)
+        return self._with(d=part, dropouts=dropouts, noise=of("noise"), most_noise=of("most_noise"))
 
     def take(self, count: int) -> Measurement:
         """The first patterns as they were shown."""
@@ -309,11 +326,42 @@ class Measurement:
             Name of the file; ``.npz`` is added if it is missing.
         """
         fields: dict[str, Any] = {"n": self.n, "h_row": self.rows, "d": self.d}
-        if self.noise is not None and self.d.ndim == 1:
-            fields["noise"] = self.noise
+        for name in ("noise", "most_noise"):
+            said = getattr(self, name)
+            if said is not None:
+                fields[name] = said
+        provenance, simulated = _nirspi.provenance(_origin(self.origin))
+        fields["provenance"] = provenance
+        if simulated is not None:
+            fields["simulated"] = int(simulated)
         if self.reference is not None:
             fields["recon"] = np.asarray(self.reference)
         np.savez(path, **fields)
+
+
+def _origin(said: Any) -> str | None:
+    """Where readings come from, for the compiled part."""
+    return None if said is None else json.dumps(said)
+
+
+def _deviations(said: Any, name: str, leading: tuple[int, ...]) -> float | np.ndarray | None:
+    """One standard deviation for all measurements, or one for each; NaN where it is not known."""
+    if said is None:
+        return None
+    values = np.asarray(_arrays.real(said, name), np.float64)
+    wrong = ~((values >= 0) & (values < np.inf) | np.isnan(values))
+    if wrong.any():
+        raise Error(f"{name} is {values[wrong].flat[0]}, expected a standard deviation of 0 or more")
+    if values.ndim and values.shape != leading:
+        raise Error(f"{name} has shape {values.shape}, expected one number, or {leading}: one a measurement")
+    return _known(values.copy())
+
+
+def _known(values: np.ndarray) -> float | np.ndarray | None:
+    """None where nothing is known, one number as a number."""
+    if np.isnan(values).all():
+        return None
+    return values if values.ndim else float(values)
 
 
 def _numbers(values: Any, name: str) -> np.ndarray:
@@ -398,7 +446,9 @@ def _of_columns(columns: dict[str, np.ndarray], name: str, source: dict[str, Any
                 with archive.open(f"{column}.npy", "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, np.asanyarray(values), allow_pickle=False)
         try:
-            return _of_loaded(_nirspi.load(path, options))
+            made = _of_loaded(_nirspi.load(path, options))
+            made.origin = None
+            return made
         except Error as error:
             raise Error(str(error).replace(path, name)) from None
 
@@ -616,8 +666,11 @@ def _of_loaded(found: _nirspi.Loaded) -> Measurement:
     made.reference = None if references is None else references.reshape(*leading, made.n, made.n)
     made.frames = None if frames is None else Account(*frames)
     made.flat_field, made.notes = found.flat_field, found.notes
+    made.origin = json.loads(found.taken)
     if found.damage is not None:
         made.notes.insert(0, found.damage)
         warnings.warn(found.damage, RuntimeWarning, stacklevel=3)
-    made.noise, made.most_noise = found.noise, found.most_noise
+    for name in ("noise", "most_noise"):
+        said = getattr(found, name)
+        setattr(made, name, None if said is None else _known(np.reshape(said, leading)))
     return made

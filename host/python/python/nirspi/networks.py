@@ -91,12 +91,14 @@ def enhance(
             report=reports if leading else reports[0],
             unit="of white",
             warnings=list(dict.fromkeys(warnings)),
+            origin=image.origin,
         )
     if n != 32:
         raise Error(f"image has shape {values.shape}, expected (..., 32, 32)")
     known = _known(blur_px, noise, consistency, steps, seed, device)
     pixels, report = _nirspi.enhance(values.reshape(-1), known)
-    return Image(pixels.reshape(*leading, 64, 64), report=json.loads(report), unit="of white")
+    made = pixels.reshape(*leading, 64, 64)
+    return Image(made, report=json.loads(report), unit="of white", origin=getattr(image, "origin", None))
 
 
 def deblur(
@@ -143,7 +145,8 @@ def deblur(
         raise Error(f"image has shape {values.shape}, expected (..., 64, 64)")
     known = _known(blur_px, noise, consistency, steps, seed, device)
     pixels, report = _nirspi.deblur(values.reshape(-1), str(model), known)
-    return Image(pixels.reshape(values.shape), report=json.loads(report), unit="of white")
+    made = pixels.reshape(values.shape)
+    return Image(made, report=json.loads(report), unit="of white", origin=getattr(image, "origin", None))
 
 
 def _known(

@@ -108,7 +108,8 @@ def reconstruct(
     warm_start : bool
         Start each measurement from those before it; not for ``hadamard`` and ``pseudo-inverse``.
     matrix : array_like, (M, height, width) or (M, height * width), optional
-        Patterns of your own instead of Hadamard rows, a picture or a row each.
+        Patterns of your own instead of Hadamard rows, a picture or a row each. Where patterns or whole
+        measurements of one scene repeat, they tell the noise, and readings count as much as it allows.
     dark : bool
         With ``matrix``: whether one constant, the reading without light, is fitted with the image.
     n : int or (int, int), optional
@@ -176,8 +177,7 @@ def reconstruct(
     if index is not None and index != "all":
         measurement = measurement[index]
     side: int = measurement.n
-    options["noise"] = measurement.noise
-    options["most_noise"] = measurement.most_noise
+    _say_noise(options, measurement)
     if dictionary is not None:
         options["dictionary"] = _atoms(dictionary, (side, side))
     d = measurement.d
@@ -200,6 +200,7 @@ def reconstruct(
         report=reports if leading else reports[0],
         unit=measurement.unit,
         rows=rows[0] if len(rows) == 1 else rows,
+        origin=measurement.origin,
     )
     return image._for(for_networks)
 
@@ -241,6 +242,12 @@ def method_options(
     }
 
 
+def _say_noise(options: dict[str, Any], measurement: Measurement) -> None:
+    for name in ("noise", "most_noise"):
+        said = getattr(measurement, name)
+        options[name] = None if said is None else np.ravel(said).tolist()
+
+
 def _run(
     n: int, rows: np.ndarray, d: np.ndarray, options: dict[str, Any]
 ) -> tuple[np.ndarray, tuple[list[Any], list[np.ndarray], np.ndarray]]:
@@ -264,9 +271,12 @@ def _while_reading(path: Any, source: dict[str, Any], options: dict[str, Any]) -
     made = _nirspi.reconstruct_file(os.fspath(path), source_options(index="all", **source), options)
     if made is None:
         return None
-    n, count, pixels, (reports, rows, for_networks) = made
+    n, count, pixels, (reports, rows, for_networks), taken = made
     image = Image(
-        pixels.reshape(count, n, n), report=_each(reports), rows=rows[0] if len(rows) == 1 else rows
+        pixels.reshape(count, n, n),
+        report=_each(reports),
+        rows=rows[0] if len(rows) == 1 else rows,
+        origin=json.loads(taken),
     )
     return image._for(for_networks)
 
@@ -307,6 +317,8 @@ def _by_matrix(readings: Any, matrix: Any, n: Any, dictionary: Any, options: dic
         raise Error(f"y has shape {y.shape}, expected (..., {weights.shape[0]}): one a pattern")
     if options["warm_start"] or options["first_of"] is not None:
         raise Error("warm_start and first_of belong to Hadamard rows, not to a matrix")
+    if isinstance(readings, Measurement):
+        _say_noise(options, readings)
     if dictionary is not None:
         options["dictionary"] = _atoms(dictionary, size)
     pixels, reports = _nirspi.reconstruct_matrix(
@@ -314,4 +326,5 @@ def _by_matrix(readings: Any, matrix: Any, n: Any, dictionary: Any, options: dic
     )
     made = [json.loads(report) for report in reports]
     leading = y.shape[:-1]
-    return Image(pixels.reshape(*leading, *size), report=made if leading else made[0])
+    origin = readings.origin if isinstance(readings, Measurement) else None
+    return Image(pixels.reshape(*leading, *size), report=made if leading else made[0], origin=origin)

@@ -166,14 +166,14 @@ struct Likelihood {
 /// Eigenvalues of a symmetric matrix that a vector contains, and the share of the vector's energy
 /// in each.
 #[derive(Debug, Clone, PartialEq)]
-struct Quadrature {
-    energy: f64,
+pub(super) struct Quadrature {
+    pub energy: f64,
     nodes: Vec<(f64, f64)>,
 }
 
 impl Quadrature {
     /// The mean of a function of the eigenvalues, weighted by the vector's energy in each.
-    fn mean(&self, of: impl Fn(f64) -> f64) -> f64 {
+    pub fn mean(&self, of: impl Fn(f64) -> f64) -> f64 {
         self.nodes.iter().map(|&(value, share)| share * of(value)).sum()
     }
 }
@@ -195,13 +195,8 @@ impl Evidence {
         for (&row, &value) in rows.iter().zip(values) {
             readings[row as usize] = value * covariance.mask[row as usize];
         }
-        let readings = covariance.quadrature(readings)?;
-        let mut random = Pcg64::seed_from_u64(SEED);
-        let mut signs = || -> Vec<f32> {
-            let sign = |mask: &f32| if random.random::<bool>() { *mask } else { -mask };
-            covariance.mask.iter().map(sign).collect()
-        };
-        let probes = (0..PROBES).filter_map(|_| covariance.quadrature(signs())).collect();
+        let of = |start| quadrature(start, covariance.count, |rows| covariance.times(rows));
+        let (readings, probes) = (of(readings)?, signs(&covariance.mask).filter_map(of).collect());
         Some(Self { count: covariance.count as f64, readings, probes })
     }
 
@@ -272,44 +267,56 @@ impl Covariance {
         grid.iter_mut().zip(&self.mask).for_each(|(v, mask)| *v *= mask);
         grid
     }
+}
 
-    /// Lanczos' method from `start`, each vector made orthogonal to all before; `None` for zeros.
-    fn quadrature(&self, start: Vec<f32>) -> Option<Quadrature> {
-        let energy = dot(&start, &start);
-        if energy <= 0.0 {
-            return None;
-        }
-        let mut basis = vec![scaled(&start, 1.0 / energy.sqrt())];
-        let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
-        while let Some(last) = basis.last() {
-            let mut next = self.times(last);
-            diagonal.push(dot(&next, last));
-            if diagonal.len() == STEPS.min(self.count) {
-                break;
-            }
-            for before in &basis {
-                let share = dot(&next, before) as f32;
-                next.iter_mut().zip(before).for_each(|(v, b)| *v -= share * b);
-            }
-            let norm = dot(&next, &next).sqrt();
-            // What is left is rounding: the vectors span all that `start` contains.
-            if norm < 1e-6 * diagonal[0] {
-                break;
-            }
-            beside.push(norm);
-            basis.push(scaled(&next, 1.0 / norm));
-        }
-        let steps = diagonal.len();
-        let matrix = DMatrix::from_fn(steps, steps, |i, j| match i.abs_diff(j) {
-            0 => diagonal[i],
-            1 => beside[i.min(j)],
-            _ => 0.0,
-        });
-        let found = SymmetricEigen::new(matrix);
-        let share = |k: usize| found.eigenvectors[(0, k)].powi(2);
-        let nodes = (0..steps).map(|k| (found.eigenvalues[k].max(0.0), share(k))).collect();
-        Some(Quadrature { energy, nodes })
+/// Random signs for the determinant of a matrix of these rows, 0 for rows that are left out.
+pub(super) fn signs(mask: &[f32]) -> impl Iterator<Item = Vec<f32>> {
+    let mut random = Pcg64::seed_from_u64(SEED);
+    let mut sign = move |mask: &f32| if random.random::<bool>() { *mask } else { -mask };
+    (0..PROBES).map(move |_| mask.iter().map(&mut sign).collect())
+}
+
+/// Lanczos' method from `start` with a symmetric matrix of this rank, by which `times` multiplies, each vector made orthogonal
+/// to all before; `None` for zeros.
+pub(super) fn quadrature(
+    start: Vec<f32>,
+    rank: usize,
+    times: impl Fn(&[f32]) -> Vec<f32>,
+) -> Option<Quadrature> {
+    let energy = dot(&start, &start);
+    if energy <= 0.0 {
+        return None;
     }
+    let mut basis = vec![scaled(&start, 1.0 / energy.sqrt())];
+    let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
+    while let Some(last) = basis.last() {
+        let mut next = times(last);
+        diagonal.push(dot(&next, last));
+        if diagonal.len() == STEPS.min(rank) {
+            break;
+        }
+        for before in &basis {
+            let share = dot(&next, before) as f32;
+            next.iter_mut().zip(before).for_each(|(v, b)| *v -= share * b);
+        }
+        let norm = dot(&next, &next).sqrt();
+        // What is left is rounding: the vectors span all that `start` contains.
+        if norm < 1e-6 * diagonal[0] {
+            break;
+        }
+        beside.push(norm);
+        basis.push(scaled(&next, 1.0 / norm));
+    }
+    let steps = diagonal.len();
+    let matrix = DMatrix::from_fn(steps, steps, |i, j| match i.abs_diff(j) {
+        0 => diagonal[i],
+        1 => beside[i.min(j)],
+        _ => 0.0,
+    });
+    let found = SymmetricEigen::new(matrix);
+    let share = |k: usize| found.eigenvectors[(0, k)].powi(2);
+    let nodes = (0..steps).map(|k| (found.eigenvalues[k].max(0.0), share(k))).collect();
+    Some(Quadrature { energy, nodes })
 }
 
 fn scaled(v: &[f32], factor: f64) -> Vec<f32> {

@@ -4,7 +4,7 @@
 //! # Invariant
 //! Nothing is assumed about the patterns. The strength of a penalty, or the number of atoms, is the
 //! one that best predicts held-back measurements, unless the caller gives it (as many
-//! orthogonal patterns as pixels: the likeliest one). Units do not matter
+//! orthogonal patterns as pixels, or Tikhonov's method where the noise is known: the likeliest one). Units do not matter
 //! (`tests::units_of_patterns_and_measurements_do_not_matter`). The mean of the image, which
 //! patterns of zeros and ones measure far better than any detail, has no penalty.
 //!
@@ -42,6 +42,7 @@ mod folds;
 mod gram;
 mod live;
 mod many;
+mod noise;
 mod problem;
 mod pseudo_inverse;
 mod solvers;
@@ -53,6 +54,7 @@ use crate::{Image, Shape, Size};
 pub use error::MatrixError;
 pub use live::LiveMatrix;
 use nalgebra::{DMatrix, DVector};
+pub use noise::{KnownNoise, NoiseFrom};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -101,6 +103,9 @@ pub struct MatrixSettings {
     pub non_negative: bool,
     /// Whether a dark level is fitted with the image.
     pub dark: bool,
+    /// Standard deviation of the noise of a measurement, if it is [known](OwnMatrix::known_noise). Tikhonov's strength is then
+    /// the one at which the measurements are most likely.
+    pub noise: Option<f64>,
 }
 
 impl MatrixSettings {
@@ -116,6 +121,7 @@ impl MatrixSettings {
             sparsity,
             non_negative: false,
             dark: true,
+            noise: None,
         }
     }
 }
@@ -314,6 +320,10 @@ impl OwnMatrix {
         if settings.non_negative && settings.atoms.is_none() && settings.basis != Basis::Pixel {
             return Err(MatrixError::Signed { basis: settings.basis });
         }
+        if let Some(found) = settings.noise.filter(|sigma| !(sigma.is_finite() && *sigma >= 0.0)) {
+            let expected = "a standard deviation of 0 or more";
+            return Err(MatrixError::Setting { setting: "noise", found, expected });
+        }
         match settings.strength {
             Some(found) if !(found > 0.0 && found <= 1e6) => {
                 let expected = "more than 0, at most 1e6";
@@ -321,6 +331,21 @@ impl OwnMatrix {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Whether an image with these settings depends on how large the [noise](MatrixSettings::noise) is: by Tikhonov's method
+    /// over a basis, whose strength is not given, of as many patterns as pixels at most.
+    #[must_use]
+    pub fn weighs_noise(&self, settings: &MatrixSettings) -> bool {
+        let is_tikhonov = matches!(
+            settings.method,
+            MatrixMethod::Best | MatrixMethod::Penalty(Penalty::Tikhonov)
+        );
+        is_tikhonov
+            && settings.strength.is_none()
+            && settings.atoms.is_none()
+            && settings.basis != Basis::Pixel
+            && self.patterns() <= self.size.area()
     }
 
     fn transform(&self, basis: Basis) -> Result<Transform<Size>, MatrixError> {

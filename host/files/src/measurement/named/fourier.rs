@@ -5,7 +5,7 @@ use crate::FileError;
 use crate::field::Field;
 use crate::fields::Fields;
 use crate::measurement::called::called;
-use crate::measurement::opened::{is_reading, read_simulated};
+use crate::measurement::opened::is_reading;
 use crate::measurement::patterns::Patterns;
 use crate::measurement::readings::readings_field;
 use crate::measurement::weighed::{Plain, Which};
@@ -42,7 +42,7 @@ pub(in crate::measurement) fn read_fourier(
     let want = &*called(&mut fields, want)?;
     let name = readings_field(&mut fields, want)?;
     let notes: Vec<String> = fields.skipped().map(str::to_owned).into_iter().collect();
-    let simulated = read_simulated(&mut fields);
+    let taken = fields.taken();
     let refused =
         |found: String, expected: String| FileError::field(readings, name.clone(), found, expected);
     let field = match fields.is_unnamed() {
@@ -92,7 +92,8 @@ pub(in crate::measurement) fn read_fourier(
             false => format!("{steps} steps of each frequency: constant light falls out"),
         });
         let places = (0..values.len()).collect();
-        found.push(Plain { patterns, values, places, not_read, simulated, notes, dark: false });
+        let (taken, noise, dark) = (taken.clone(), None, false);
+        found.push(Plain { patterns, values, places, not_read, taken, noise, notes, dark });
     }
     Ok(found)
 }

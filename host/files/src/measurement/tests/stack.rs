@@ -180,3 +180,36 @@ fn files_without_a_block_are_read_one_by_one() {
     pairs[2] = ("y.npy", npy_f64("(2, 6)", &[1.0; 12]));
     none(pairs, as_is());
 }
+
+#[test]
+fn what_a_file_says_of_the_noise_is_of_all_or_of_each() {
+    let said = |noise: &[f64], most: &[f64]| {
+        let shape = |values: &[f64]| match values.len() {
+            1 => "()".to_owned(),
+            count => format!("({count},)"),
+        };
+        let bytes = zip(
+            Zip::Stored,
+            &[
+                ("n.npy", npy_i32("()", &[2])),
+                ("h_row.npy", npy_i32("(3,)", &[0, 1, 2])),
+                ("d.npy", npy_f64("(2, 3)", &[4.0, 1.0, 2.0, 5.0, 1.0, 2.0])),
+                ("noise.npy", npy_f64(&shape(noise), noise)),
+                ("most_noise.npy", npy_f64(&shape(most), most)),
+            ],
+        );
+        let (_guard, path) = file("lab.npz", &bytes);
+        let mut several = Several::open(&path, &as_is()).unwrap();
+        let each: Vec<_> =
+            several.each().unwrap().iter().map(|one| [one.noise, one.most_noise]).collect();
+        let mut several = Several::open(&path, &as_is()).unwrap();
+        let stack = several.stack().unwrap().unwrap();
+        assert_eq!((0..2).map(|index| stack.noise(index)).collect::<Vec<_>>(), each);
+        each
+    };
+    let (one, two) = (Some(0.5), Some(0.25));
+    assert_eq!(said(&[0.5], &[0.25]), [[one, two], [one, two]]);
+    assert_eq!(said(&[0.5, 0.25], &[f64::NAN, 0.5]), [[one, None], [two, one]]);
+    // A column of a table; nonsense says nothing.
+    assert_eq!(said(&[0.5, 0.5, 0.5], &[-1.0]), [[one, None], [one, None]]);
+}

@@ -6,7 +6,8 @@
 //! measurements would cost most and say least. The strength `t` is the one at which the measurements
 //! are most likely, if coefficients are normal with variance `s^2` and noise with `t`, both times a
 //! common factor (evidence, or restricted likelihood: H. D. Patterson and R. Thompson, *Biometrika*
-//! 58, 545, 1971). So the finest details, which scenes hardly have, tell the noise.
+//! 58, 545, 1971). So the finest details, which scenes hardly have, tell the noise. Where the noise is known, it is the
+//! factor that is left.
 
 use super::problem::Fit;
 use super::{DarkLevel, MatrixMethod, MatrixSettings, OwnMatrix, Penalty, STRENGTHS};
@@ -49,7 +50,10 @@ pub(super) fn solve(own: &OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Op
     let details: Vec<usize> = (0..sizes.len()).filter(|&j| frequencies[j] > 0.0).collect();
     let outside: f64 = details.iter().map(|&j| constant[j].powi(2)).sum();
     let sees_dark = outside > SEEN * constant.iter().map(|v| v * v).sum::<f64>();
-    let model = Model { found, constant, sizes, details, fits_dark: settings.dark && sees_dark };
+    let fits_dark = settings.dark && sees_dark;
+    let known = settings.noise.filter(|sigma| *sigma > 0.0);
+    let known = known.map(|sigma| (sigma / unit).powi(2) / energy);
+    let model = Model { found, constant, sizes, details, fits_dark, known };
     let relative = model.details.iter().map(|&j| model.sizes[j]).sum::<f64>() / y.len() as f64;
     let strength = settings.strength.unwrap_or_else(|| model.likeliest(relative));
 
@@ -95,6 +99,8 @@ struct Model {
     /// All coefficients except the mean.
     details: Vec<usize>,
     fits_dark: bool,
+    /// Variance of the noise of a coefficient, if it is known.
+    known: Option<f64>,
 }
 
 impl Model {
@@ -117,13 +123,16 @@ impl Model {
     /// The strength at which the coefficients are most likely. `relative` times a strength is the
     /// noise.
     fn likeliest(&self, relative: f64) -> f64 {
-        let strengths = STRENGTHS.windows(2).flat_map(|two| {
+        // More noise than light is likely only where it is known.
+        let stronger: &[f64] = if self.known.is_some() { &[1e3, 1e2, 1e1] } else { &[] };
+        let tried = [stronger, &STRENGTHS].concat();
+        let strengths = tried.windows(2).flat_map(|two| {
             let ratio = (two[1] / two[0]).powf(1.0 / f64::from(BETWEEN));
             (0..BETWEEN).map(move |k| two[0] * ratio.powi(k as i32))
         });
-        let strengths = strengths.chain([STRENGTHS[STRENGTHS.len() - 1]]);
+        let strengths = strengths.chain(tried.last().copied());
         let likely = strengths.map(|strength| (self.likelihood(strength * relative), strength));
-        likely.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(STRENGTHS[0], |(_, strength)| strength)
+        likely.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(tried[0], |(_, strength)| strength)
     }
 
     /// Logarithm of the restricted likelihood, without what is the same for all strengths.
@@ -136,7 +145,11 @@ impl Model {
             false => 0.0,
         };
         let count = self.details.len() - usize::from(self.fits_dark);
-        // Coefficients of 0 have no likeliest strength.
-        -0.5 * (widths + freedom + count as f64 * misfit.max(f64::MIN_POSITIVE).ln())
+        let of_factor = match self.known {
+            Some(variance) => misfit * noise / variance + count as f64 * (variance / noise).ln(),
+            // Coefficients of 0 have no likeliest strength.
+            None => count as f64 * misfit.max(f64::MIN_POSITIVE).ln(),
+        };
+        -0.5 * (widths + freedom + of_factor)
     }
 }

@@ -13,12 +13,16 @@ use super::solvers::{ITERATIONS, SETTLED};
 use super::{DarkLevel, MatrixSettings, OwnMatrix, STRENGTHS, energies, images, last_as_good};
 use crate::Size;
 use crate::basis::{Basis, Transform};
+use crate::reconstruct::noise;
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Part of the patterns' norm below which what is left of them is rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Strengths of which the likeliest is found: powers of ten, this many a decade.
+const LIKELY: (i32, i32, i32) = (-6, 3, 4);
 
 /// What the patterns say of Tikhonov's problem, before any measurement.
 pub(super) struct Products {
@@ -99,6 +103,41 @@ impl Products {
             energies: energies(&own.patterns),
             dark: settings.dark,
         })
+    }
+
+    /// The strength at which the measurements are most likely with noise of this standard deviation; `None` for measurements
+    /// that say nothing. The model is that of [`noise`]: coefficients are normal with variance `a s^2`, the noise with `a t`.
+    pub(super) fn likeliest(&self, own: &OwnMatrix, y: &[f64], sigma: f64) -> Option<f64> {
+        let (y, parts) = (DVector::from_column_slice(y), Vec::new());
+        let folds = Folds { own, of: self, y, strengths: Vec::new(), parts };
+        let every: Vec<usize> = (0..folds.y.len()).collect();
+        let part = folds.part(&every, self.dark);
+        let run = folds.run(&part);
+        let count = folds.y.len().checked_sub(part.free.len()).filter(|_| run.scale > 0.0)?;
+        // In units in which the measurements have variance 1.
+        let variance = (sigma * run.scale / run.unit).powi(2);
+        let vector = |v: &[f32]| DVector::from_iterator(v.len(), v.iter().map(|&v| f64::from(v)));
+        let rounded = |v: DVector<f64>| -> Vec<f32> { v.iter().map(|&v| v as f32).collect() };
+        let times = |v: &[f32]| {
+            rounded(part.projected(&self.products * part.projected(vector(v))) * run.scale)
+        };
+        let readings = noise::quadrature(rounded(run.direction.clone()), count, times)?;
+        let ones = vec![1.0; folds.y.len()];
+        let probes = noise::signs(&ones).map(|signs| rounded(part.projected(vector(&signs))));
+        let probes: Vec<_> =
+            probes.filter_map(|signs| noise::quadrature(signs, count, times)).collect();
+        let count = count as f64;
+        let likelihood = |strength: &f64| {
+            let determinants: f64 =
+                probes.iter().map(|probe| probe.mean(|v| (v + strength).ln())).sum();
+            let misfit = readings.energy * readings.mean(|v| 1.0 / (v + strength)) * strength;
+            let factor = (variance / strength).ln();
+            -(misfit / variance + count * (determinants / probes.len() as f64 + factor))
+        };
+        let (lowest, highest, a_decade) = LIKELY;
+        let tried = (lowest * a_decade..=highest * a_decade)
+            .map(|step| 10.0_f64.powf(f64::from(step) / f64::from(a_decade)));
+        tried.max_by(|a, b| likelihood(a).total_cmp(&likelihood(b)))
     }
 
     /// The problem of these measurements by the patterns of which these are the products. Without a strength, one is

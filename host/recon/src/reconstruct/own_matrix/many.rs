@@ -133,7 +133,11 @@ impl<'m> Many<'m> {
                 if let Some(products) = self.products() =>
             {
                 let made = |at: &usize| {
-                    let (fit, strength) = self.folds(products, *at).chosen();
+                    let (own, y) = (self.own, self.all[*at]);
+                    let known = self.settings.noise.filter(|sigma| *sigma > 0.0);
+                    let likeliest = || products.likeliest(own, y, known?);
+                    let strength = self.settings.strength.or_else(likeliest);
+                    let (fit, strength) = products.folds(own, y, strength).chosen();
                     Made { fit, strength: Some(strength), atoms: None }
                 };
                 which.iter().map(made).collect()
