@@ -71,7 +71,7 @@ mod tests {
 
     /// Light of the LEDs that row `row` lights, or its complement, before LEDs of these lights.
     fn light(leds: &[f64], row: u32, complement: bool, sag: f64) -> f64 {
-        let is_lit = |at: usize| ((row & at as u32).count_ones() % 2 == 0) != complement;
+        let is_lit = |at: usize| (row & at as u32).count_ones().is_multiple_of(2) != complement;
         let tile = |at: usize| (at / 32 / 8, at % 32 / 8);
         let mut lit = [[0; 4]; 4];
         for at in (0..1024).filter(|&at| is_lit(at)) {
