@@ -11,13 +11,12 @@ use super::field::{EXPECTED, Field, is_counter};
 use super::hdf5::Hdf5;
 use super::mat::Mat;
 use super::mat4::Mat4;
-use super::measurement::{PROVENANCE, read_simulated};
 use super::npy;
 use super::plain::{is_mat_4, kind_by_start, open_file, open_start, read_small_text};
 use super::stored::Stored;
 use super::text;
 use super::wav;
-use crate::provenance::{Origin, Taken, beside_array};
+use crate::provenance::{FIELD, Origin, Taken, beside_array};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -71,7 +70,7 @@ pub(super) fn stated_beside(path: &Path) -> Option<Taken> {
 fn beside(path: &Path) -> Option<String> {
     let text = read_small_text(&beside_array(path)).ok()?;
     let report: serde_json::Value = serde_json::from_str(&text).ok()?;
-    report.get(PROVENANCE).map(ToString::to_string)
+    report.get(FIELD).map(ToString::to_string)
 }
 
 impl Fields {
@@ -189,13 +188,27 @@ impl Fields {
     /// real light was measured. The name of the file is left out.
     pub(super) fn taken(&mut self) -> Taken {
         let json = match &mut self.format {
-            Format::Npz(archive) => archive.text(PROVENANCE),
+            Format::Npz(archive) => archive.text(FIELD),
             _ => self.provenance.clone(),
         };
         let stated = json.and_then(|json| Taken::stated(&json));
         stated
             .filter(|taken| taken.origin != Origin::Unknown)
-            .unwrap_or_else(|| Taken::simulated_or(read_simulated(self)))
+            .unwrap_or_else(|| Taken::simulated_or(self.simulated()))
+    }
+
+    /// Whether the file says that no real light was measured. A field of another kind says nothing.
+    fn simulated(&mut self) -> Option<bool> {
+        const SIMULATED: &str = "simulated";
+        if self.is_unnamed() || !self.holds(SIMULATED) {
+            return None;
+        }
+        let one = |shape: &[u64]| match shape.iter().all(|&axis| axis == 1) {
+            true => Ok(()),
+            false => Err("one number".to_owned()),
+        };
+        let field = self.read(SIMULATED, one).ok()?;
+        field.real.first().map(|&value| value != 0.0)
     }
 
     /// Whether the file is a text.

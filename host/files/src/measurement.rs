@@ -61,7 +61,7 @@ pub use named::NamedPatterns;
 use nirspi_recon::law::{Claim, Lamp};
 use nirspi_recon::{Image, Order, Rows, Side};
 use opened::Opened;
-pub(crate) use opened::{is_reading, read_simulated};
+pub(crate) use opened::is_reading;
 pub use patterns::{PatternSelection, Patterns};
 pub use plain::{PlainSweeps, read_plain, read_plain_all};
 use rayon::prelude::*;
@@ -72,7 +72,7 @@ use std::path::Path;
 pub use sweeps::{Sweeps, most_together};
 pub use weighed::Plain;
 pub(crate) use write::READINGS;
-pub use write::{PROVENANCE, encode, noise_of, write_readings};
+pub use write::{encode, noise_of, write_readings};
 
 /// What to read from a file, and what the file itself does not say.
 #[derive(Debug, Clone, Default, PartialEq)]

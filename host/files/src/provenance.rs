@@ -18,6 +18,9 @@ use std::path::{Path, PathBuf};
 /// The key of the JSON text: a PNG's text chunk and an MCAP file's metadata record.
 pub const KEY: &str = "nirspi-provenance";
 
+/// The field with the provenance as JSON: of an archive, and of the report beside an array.
+pub const FIELD: &str = "provenance";
+
 /// Where readings come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Origin {

@@ -13,8 +13,8 @@ mod export;
 
 use super::FileError;
 use super::field::{EXPECTED, Field};
-use super::measurement::PROVENANCE;
 use super::plain::{is_heading, read_large_text, start_of_text};
+use crate::provenance;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -95,7 +95,7 @@ fn read_str(path: &Path, text: String, decimal_comma: bool) -> Result<Text, File
 fn provenance(text: &str) -> Option<String> {
     let mut comments = text.lines().take_while(|line| line.starts_with('#'));
     let of = |line: &str| {
-        Some(line[1..].trim_start().strip_prefix(PROVENANCE)?.strip_prefix(": ")?.to_owned())
+        Some(line[1..].trim_start().strip_prefix(provenance::FIELD)?.strip_prefix(": ")?.to_owned())
     };
     comments.find_map(of)
 }

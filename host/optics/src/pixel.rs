@@ -147,9 +147,9 @@ impl PixelBudget {
         let Readout { clocks_per_pattern, blanked, .. } = instrument.readout;
         let window = u32::from(clocks_per_pattern.saturating_sub(blanked).max(1));
         let own = chain.own_share(clocks_per_pattern.into(), blanked.into());
-        // In a tile that sees the same everywhere, n lit LEDs of 64 give n (1 - sag n / 64), and pattern less complement
-        // is (2 n - 64) (1 - sag).
-        let sagged = 1.0 - instrument.tile_sag;
+        // Calibrated readings are those of a stiff supply. But for 16 of 1024, they were divided by 1 - sag / 2, and their
+        // noise with them.
+        let sagged = 1.0 - instrument.tile_sag / 2.0;
         let settled = (own - (1.0 - own) / 2.0) * sagged;
         let clocks = exposure_us * 1e3 / instrument.budget.sample_ns;
         let samples = clocks * f64::from(window) / f64::from(clocks_per_pattern);

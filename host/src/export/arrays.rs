@@ -3,9 +3,10 @@
 use super::{ExportError, Whole};
 use crate::files::FileError;
 use crate::files::archive::write_members;
-use crate::files::measurement::{PROVENANCE, noise_of};
+use crate::files::measurement::noise_of;
 use crate::files::npy::{Element, encode, encode_text, header};
 use crate::files::output::{Existing, write_in_pieces, write_result};
+use crate::files::provenance::FIELD;
 use crate::provenance::{Provenance, beside_array};
 use crate::source::Stamp;
 use std::io::{self, Write};
@@ -29,7 +30,7 @@ pub(super) fn npz(
             zip.add(name, &encode(&[], &[sigma]))?;
         }
         zip.add("simulated", &encode(&[], &[i64::from(whole.is_simulated())]))?;
-        zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
+        zip.add(FIELD, &encode_text(&provenance.json()))?;
         zip.begin("frames")?;
         let stamps = frames(whole, |bytes| zip.write(bytes))?;
         let mut add = |name: &str, of: fn(&Stamp) -> i64| {
@@ -94,7 +95,7 @@ pub(super) fn csv(
         let write = || -> io::Result<()> {
             let what = if whole.is_simulated() { ", simulated" } else { "" };
             writeln!(file, "# mean of {} frames, ADC counts{what}", whole.frames.len())?;
-            writeln!(file, "# {PROVENANCE}: {}", provenance.json())?;
+            writeln!(file, "# {FIELD}: {}", provenance.json())?;
             // Such as that the mean is one of the newest frames alone.
             whole.source.notes.iter().try_for_each(|note| writeln!(file, "# note: {note}"))?;
             // The noise of `d` is the same for all.

@@ -88,7 +88,6 @@ fn images_are_shares_of_white_with_their_noise_and_the_fit_stands_beside_the_sco
     for (file, grid, stage) in [
         ("raw", "truth", &report["raw"]),
         ("reconstruction", "truth", &report["reconstruction"]),
-        ("frames", "truth", &report["reconstruction"]),
         ("upscaled", "truth_64", &report["enhancement"]["upscaled"]),
         ("fused", "truth_64", &report["enhancement"]["fused"]),
         ("deblurred", "truth_64", &report["enhancement"]["deblurred"]),

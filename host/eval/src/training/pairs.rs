@@ -7,7 +7,7 @@
 
 use super::{CameraPicture, LinearCamera, Rainfall, TrainingCameraError};
 use nirspi::files::FileError;
-use nirspi::files::measurement::PROVENANCE;
+use nirspi::files::provenance::FIELD;
 use nirspi::files::{archive, npy};
 use nirspi::provenance::Provenance;
 use nirspi_nets::data::{Origin, Part, Purpose, SIDE_PX, Scene, Scenes, stream};
@@ -91,7 +91,7 @@ pub fn encode(
         .flat_map(|pair| pair.picture.reading.depth.as_ref().map_or([0.0; 64], |d| d.metres))
         .collect();
     let members = [
-        (PROVENANCE, npy::encode_text(&provenance.json())),
+        (FIELD, npy::encode_text(&provenance.json())),
         ("x", images(SIDE_PX, &|p| &p.scene.image)),
         ("optical", images(SIDE_PX, &|p| &p.picture.reading.optical)),
         ("y", images(READING_PX, &|p| &p.picture.reading.image)),

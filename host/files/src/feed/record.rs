@@ -8,11 +8,11 @@
 use super::header::{FeedPatterns, Header};
 use crate::FileError;
 use crate::archive::{MAX_FIELD_BYTES, Members, write_members};
-use crate::measurement::{PROVENANCE, READINGS, most_together};
+use crate::measurement::{READINGS, most_together};
 use crate::npy::{encode, encode_text, header_of};
 use crate::output::{Existing, Spool};
 use crate::plain::MAX_MEMORY_BYTES;
-use crate::provenance::Provenance;
+use crate::provenance::{self, Provenance};
 use nirspi_recon::law::Form;
 use std::io::{BufWriter, IntoInnerError, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -193,7 +193,7 @@ impl About {
                     zip.add("width", &one(size.width()))?;
                 }
             }
-            zip.add(PROVENANCE, &encode_text(&provenance.json()))?;
+            zip.add(provenance::FIELD, &encode_text(&provenance.json()))?;
             for (field, text) in [("unit", &header.unit), ("name", &header.name)] {
                 text.as_ref().map_or(Ok(()), |text| zip.add(field, &encode_text(text)))?;
             }

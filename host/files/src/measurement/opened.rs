@@ -305,17 +305,3 @@ pub(crate) fn is_reading(value: f64) -> bool {
 pub(super) fn stated_form(fields: &mut Fields) -> Option<Form> {
     fields.text(READINGS)?.parse().ok()
 }
-
-/// Whether the file says that no real light was measured. A field of another kind says nothing.
-pub(crate) fn read_simulated(fields: &mut Fields) -> Option<bool> {
-    const FIELD: &str = "simulated";
-    if fields.is_unnamed() || !fields.holds(FIELD) {
-        return None;
-    }
-    let one = |shape: &[u64]| match shape.iter().all(|&axis| axis == 1) {
-        true => Ok(()),
-        false => Err("one number".to_owned()),
-    };
-    let field = fields.read(FIELD, one).ok()?;
-    field.real.first().map(|&value| value != 0.0)
-}

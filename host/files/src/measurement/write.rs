@@ -4,13 +4,10 @@ use super::FileError;
 use super::noise::{MOST_NOISE, NOISE};
 use crate::npy::Element;
 use crate::output::Existing;
-use crate::provenance::Provenance;
+use crate::provenance::{self, Provenance};
 use crate::{archive, npy};
 use nirspi_recon::Measurements;
 use std::path::Path;
-
-/// The field of an `.npz` file with its provenance, as JSON text.
-pub const PROVENANCE: &str = "provenance";
 
 /// The field of an `.npz` file with the form of `y`, as text.
 pub(crate) const READINGS: &str = "readings";
@@ -34,7 +31,7 @@ pub fn encode(
         ("n", npy::encode(&[], &[measurements.side().pixels() as i64])),
         ("h_row", npy::encode(&count, &rows)),
         ("d", npy::encode(&count, measurements.values())),
-        (PROVENANCE, npy::encode_text(&provenance.json())),
+        (provenance::FIELD, npy::encode_text(&provenance.json())),
     ];
     let simulated = provenance.taken.simulated();
     members.extend(noise_of(measurements).map(|(name, sigma)| (name, npy::encode(&[], &[sigma]))));
@@ -60,7 +57,7 @@ pub fn write_readings(
     provenance: &Provenance,
 ) -> Result<(), FileError> {
     archive::write_members(path, existing, |zip| {
-        zip.add(PROVENANCE, &npy::encode_text(&provenance.json()))?;
+        zip.add(provenance::FIELD, &npy::encode_text(&provenance.json()))?;
         zip.begin("y")?;
         zip.write(&npy::header::<f64>(&[readings.len()]))?;
         // Millions of readings are not in memory twice.
