@@ -141,3 +141,16 @@ fn without_alternation_the_corner_is_lost() {
         assert!(corner > 0.5 && lost_db > 5.0, "{name}: {corner} {lost_db}");
     }
 }
+
+/// A burst in which the lines are not inverted takes their charge for light, and finds the latency one clock late.
+#[test]
+fn with_the_latency_of_a_burst_that_does_not_invert_its_lines_the_images_are_lost() {
+    let (mut circuit, ideal) = (Calibrated::new(CIRCUIT), Calibrated::new(IDEAL));
+    circuit.settling.adc_latency += 1;
+    for (name, scene) in scenes() {
+        let shown = Shown { order: Order::ZigZag, sampling: 1.0, alternating: true };
+        let (_, lost_db) = loss(&circuit, &ideal, &scene, &shown);
+        println!("{name}: {lost_db:.1} dB");
+        assert!(lost_db > 3.0, "{name}: {lost_db}");
+    }
+}
