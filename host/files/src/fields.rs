@@ -16,7 +16,7 @@ use super::plain::{is_mat_4, kind_by_start, open_file, open_start, read_small_te
 use super::stored::Stored;
 use super::text;
 use super::wav;
-use crate::provenance::{FIELD, Origin, Taken, beside_array};
+use crate::provenance::{FIELD, Origin, Provenance, Taken, beside_array};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -63,7 +63,13 @@ enum Format {
 
 /// What the file beside an array says of where its numbers come from.
 pub(super) fn stated_beside(path: &Path) -> Option<Taken> {
-    Taken::stated(&beside(path)?)
+    stated(&beside(path)?)
+}
+
+/// What the JSON text of a [`Provenance`] says of the readings, without the name of their file. `None` for another text.
+fn stated(json: &str) -> Option<Taken> {
+    let found: Provenance = serde_json::from_str(json).ok()?;
+    Some(Taken { file: None, ..found.taken })
 }
 
 /// The provenance in the file beside an array, as JSON.
@@ -191,8 +197,7 @@ impl Fields {
             Format::Npz(archive) => archive.text(FIELD),
             _ => self.provenance.clone(),
         };
-        let stated = json.and_then(|json| Taken::stated(&json));
-        stated
+        json.and_then(|json| stated(&json))
             .filter(|taken| taken.origin != Origin::Unknown)
             .unwrap_or_else(|| Taken::simulated_or(self.simulated()))
     }

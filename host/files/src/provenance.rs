@@ -117,13 +117,6 @@ impl Taken {
         })
     }
 
-    /// What the JSON text of a [`Provenance`] says of the readings, without the name of their file. `None` for another text.
-    #[must_use]
-    pub(crate) fn stated(json: &str) -> Option<Self> {
-        let found: Provenance = serde_json::from_str(json).ok()?;
-        Some(Self { file: None, ..found.taken })
-    }
-
     /// No readings of a camera: those of a model, or none.
     #[must_use]
     pub fn without_camera(origin: Origin) -> Self {

@@ -236,7 +236,7 @@ fn tables_charts_and_times_are_signed() {
             &["physics", "range", "--out", "range", "--json"][..],
             "physics range",
             "range",
-            17,
+            21,
             SIMULATED,
         ),
         (
