@@ -234,7 +234,7 @@ fn written_again(file: &MeasurementFile) {
     std::fs::write(&path, bytes).expect("its file");
     let again = measurement::read(&path, &Selection::default()).expect("our own file");
     assert_eq!((&again.h_row, &again.readings), (&file.h_row, &file.readings));
-    assert_eq!(again.simulated, Some(true));
+    assert_eq!(again.taken.simulated(), Some(true));
 }
 
 /// Names that fields can have, the first two bytes of each field being its name and its length / 16.
