@@ -17,7 +17,7 @@ fn unit(name: &str) -> PyResult<Unit> {
     })
 }
 
-/// A PNG of one image with a grey bar and lines of facts.
+/// A PNG of one image with a grey bar, and with what is said of it: lines of facts, and warnings.
 #[pyfunction]
 pub fn picture<'py>(
     py: Python<'py>,
@@ -25,12 +25,11 @@ pub fn picture<'py>(
     size: (usize, usize),
     title: &str,
     unit_name: &str,
-    caption: Vec<String>,
-    warnings: Vec<String>,
+    said: (Vec<String>, Vec<String>),
     taken: Option<&str>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let values = slice(&values)?;
-    let (width, height) = size;
+    let ((width, height), (caption, warnings)) = (size, said);
     if width == 0 || height == 0 || values.len() != width * height {
         return Err(refused(format!(
             "{} values, expected {width} x {height}, at least one",

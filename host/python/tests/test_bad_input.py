@@ -175,8 +175,8 @@ def test_the_compiled_part_refuses_what_the_python_files_do_not_pass():
         with pytest.raises((ns.Error, TypeError)):
             operator.forward(wrong)
     for use in (
-        lambda: _nirspi.picture(np.zeros(3, np.float32), (2, 2), "", "of white", [], [], None),
-        lambda: _nirspi.picture(np.zeros(0, np.float32), (0, 0), "", "of white", [], [], None),
+        lambda: _nirspi.picture(np.zeros(3, np.float32), (2, 2), "", "of white", ([], []), None),
+        lambda: _nirspi.picture(np.zeros(0, np.float32), (0, 0), "", "of white", ([], []), None),
         lambda: _nirspi.sheet(np.zeros(5, np.float32), 2, "", "of white", None),
         lambda: _nirspi.sheet(np.zeros(4, np.float32), 2, "", "volts", None),
         lambda: _nirspi.reconstruct(8, np.arange(3), np.zeros(4), {}),

@@ -147,8 +147,7 @@ def picture(
     size: tuple[int, int],
     title: str,
     unit_name: str,
-    caption: list[str],
-    warnings: list[str],
+    said: tuple[list[str], list[str]],
     taken: str | None,
 ) -> bytes: ...
 def provenance(taken: str | None) -> tuple[str, bool | None]: ...

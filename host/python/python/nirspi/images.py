@@ -149,7 +149,7 @@ class Image(np.ndarray):
             size = (values.shape[1], values.shape[0])
             facts = [self.facts()] if self.facts() else []
             warnings = list(self.warnings)
-            return _nirspi.picture(values.reshape(-1), size, title, self.unit, facts, warnings, taken)
+            return _nirspi.picture(values.reshape(-1), size, title, self.unit, (facts, warnings), taken)
         if values.shape[-1] != values.shape[-2]:
             raise _nirspi.Error(f"a stack of shape {self.shape}, expected square images: draw images[k]")
         header = title or self.facts()
