@@ -87,7 +87,7 @@ pub enum CalibrationError {
 /// The second row in natural order lights half of each tile.
 const _: () = assert!(sag::HALF_OF_EACH_TILE == 1);
 
-/// The setup for a burst of the first so many rows in natural order.
+/// The setup for a burst of the first `patterns` rows in natural order.
 fn burst_setup(patterns: usize) -> MeasurementSetup {
     MeasurementSetup {
         order: "calibration".to_owned(),
@@ -164,7 +164,7 @@ pub fn calibrate(
     Ok(Settling { tile_sag, ..settling })
 }
 
-/// As [`calibrate`], with an earlier calibration `known`. If the burst is too dim to show latency
+/// As [`calibrate`], with an earlier calibration `known`, whose sag of the supplies holds on. If the burst is too dim to show latency
 /// and response, the result has the latency and response of `known` with the dark level and the
 /// step of this burst, and the error is returned with the result.
 ///
@@ -177,12 +177,12 @@ pub fn calibrate_or(
 ) -> Result<(Settling, Option<CalibrationError>), CalibrationError> {
     let samples = bursts(session, listener, 1)?;
     Ok(match evaluate(&samples) {
-        Ok(settling) => (settling, None),
+        Ok(settling) => (Settling { tile_sag: known.tile_sag, ..settling }, None),
         Err(problem) => (known.at_levels_of(&samples), Some(problem)),
     })
 }
 
-/// The samples of all bursts of so many patterns, one after another.
+/// The samples of all bursts of `patterns` patterns, one after another.
 fn bursts(
     session: &mut Session,
     listener: &mut dyn Listener,
