@@ -8,7 +8,7 @@ use nirspi::response::Settling;
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
-use nirspi_optics::Scene;
+use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Order, metrics, reconstruct};
 use nirspi_virtual::{MemoryLink, VirtualOptics, calibrate_against_white, shoot};
 use std::ops::ControlFlow;
@@ -76,4 +76,25 @@ fn a_far_letter_is_dim_and_never_inverted() {
         // What a latency of 0 in place of the measured one would do.
         assert!(right > least && wrong < right - better, "{distance_mm} mm: {right}, {wrong}");
     }
+}
+
+/// A capture without complements takes a burst of its own for the dark level, and keeps the sag of the supplies, which only a
+/// whole calibration measures: the image is that of a capture with complements.
+#[test]
+fn a_capture_that_takes_its_dark_level_keeps_the_sag() {
+    let camera = CameraModel::parse("[leds]\npower_mw = 40\ntile_sag = 0.1").unwrap();
+    let optics = VirtualOptics::of(&camera, Scene::white(), 300.0).unwrap();
+    let settling = calibrate_against_white(&optics, 1).unwrap();
+    assert!((settling.tile_sag - 0.1).abs() < 0.01, "{settling:?}");
+    let mean = |differential| {
+        let setup = optics.setup(&Order::Natural, 1.0).unwrap();
+        let setup =
+            MeasurementSetup { differential, alternating: differential, sweeps: 4, ..setup };
+        let go_on = &mut |_: &_| ControlFlow::Continue(());
+        let shot = shoot(&optics, setup, &settling, 8, 1, go_on).unwrap();
+        let image = reconstruct::hadamard(&shot.measurements().unwrap());
+        image.pixels().iter().map(|&value| f64::from(value)).sum::<f64>() / 1024.0
+    };
+    let (pairs, single) = (mean(true), mean(false));
+    assert!((single / pairs - 1.0).abs() < 0.02, "{single} {pairs}");
 }
