@@ -93,8 +93,8 @@ pub struct SceneArgs {
     pub weather: WeatherArgs,
     #[command(flatten)]
     pub motion: MotionArgs,
-    /// A spot of the target, as large as a pixel, that throws the LEDs' light straight back: so many times as bright as
-    /// white paper, such as 50, or 50@8,23 with its row and column
+    /// A spot of the target, as large as a pixel, that throws the LEDs' light straight back. 50 is a spot 50 times as bright
+    /// as white paper; 50@8,23 also says its row and column
     #[arg(long, value_name = "TIMES[@ROW,COLUMN]")]
     pub specular: Option<SpecularSpot>,
     #[command(flatten)]
@@ -271,8 +271,8 @@ pub struct SetupArgs {
     /// Share of all patterns to show, the first of the order: 0.3 or 30% [default: 0.5]
     #[arg(long, value_name = "SHARE")]
     pub sampling: Option<Sampling>,
-    /// Sweeps summed into one frame [default: so many that a frame takes about as long as one sweep of all patterns; with --light,
-    /// so many that the boards' link carries every frame]
+    /// Sweeps summed into one frame [default: as many as take about the time of one sweep of all patterns; with --light, as
+    /// many as slow the frames down to what the boards' link carries]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub sweeps: Option<u32>,
     /// ADC clocks (of 8 ns) for which each pattern is shown: 5 is 25 MHz [default: what the camera description says; 5 for

@@ -2,8 +2,9 @@
 
     python3 empty_root.py WHEEL [PROGRAM]
 
-Linux alone. Both run in a root that holds Python, NumPy and their libraries: no /proc, no /dev, no
-shell, no compiler, and no library beyond those of Python and of manylinux. The program gets none. Needs the right to `chroot`, as root or by `unshare`. Exits with 1 where something does not run.
+For Linux alone. Both run in a root folder that holds Python, NumPy and their libraries: no /proc, no /dev, no shell,
+no compiler, and no library beyond those of Python and of manylinux. The program uses none of Python's. The script
+needs the right to `chroot`, as root or by `unshare`. It exits with 1 if something does not run.
 """
 
 import os

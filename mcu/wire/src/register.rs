@@ -119,7 +119,7 @@ registers! {
     /// most [`DUTY_LIMIT_MAX`]. Windows are fixed, one begins whenever the clock since reset is a
     /// multiple of their length, so that no sequence of starts gets around the limit.
     DutyLimit = 0x11, ReadWrite, DUTY_LIMIT_MAX;
-    /// The run ends when so many samples of one frame or raw burst, blanked ones included, are over
+    /// The run ends when this number of samples of one frame or raw burst, blanked ones included, are over
     /// range. 0 never ends a run.
     OverRangeTrip = 0x12, ReadWrite, 4096;
     /// Frames completed in this run, lost ones too.

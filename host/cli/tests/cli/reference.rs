@@ -61,7 +61,7 @@ const MORE: [(&str, &str); 26] = [
     ("dev virtual", "[recordings](recordings.md)"),
 ];
 
-/// So many commands have an option with the same words before it stands in the part that they share.
+/// An option that at least this number of commands have, with the same words, stands in the shared part of the page.
 const SHARED_BY: usize = 3;
 
 /// A part of a help text behind the line of usage.
