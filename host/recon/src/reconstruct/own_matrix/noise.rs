@@ -256,4 +256,35 @@ mod tests {
             assert_eq!(own.weighs_noise(&MatrixSettings::new(method)), weighs, "{method:?}");
         }
     }
+    /// As many orthogonal patterns as pixels have a way of their own. Whatever the size of the weights, the known noise chooses
+    /// a strength about as good as the best of all, which only the truth tells.
+    #[test]
+    fn a_known_noise_is_as_good_for_complete_sets_as_the_best_strength() {
+        let mut random = Pcg64::seed_from_u64(7);
+        let method = MatrixMethod::Penalty(Penalty::Tikhonov);
+        for weight in [1.0, 3.0] {
+            let sign = |at: usize| ((at / 256) & (at % 256)).count_ones().is_multiple_of(2);
+            let weights: Vec<f64> =
+                (0..256 * 256).map(|at| if sign(at) { weight } else { -weight }).collect();
+            let own = OwnMatrix::new(side(16), &weights).unwrap();
+            for (kind, noise) in [(0, 4.0), (1, 12.0), (2, 12.0)] {
+                let image = scene(side(16), kind);
+                let sigma = noise * weight;
+                let y = see(&weights, &image, sigma, &mut random);
+                let error = |noise: Option<f64>, strength: Option<f64>| {
+                    let settings =
+                        MatrixSettings { noise, strength, ..MatrixSettings::new(method) };
+                    let found = own.reconstruct(&y, &settings).unwrap();
+                    let missed = found.image.pixels().iter().zip(&image);
+                    missed.map(|(a, b)| (f64::from(*a) - b).powi(2)).sum::<f64>()
+                };
+                let known = error(Some(sigma), None);
+                let strengths = (-24..=12).map(|power| 10_f64.powf(f64::from(power) / 4.0));
+                let best = strengths.map(|strength| error(None, Some(strength)));
+                let best = best.fold(f64::INFINITY, f64::min);
+                println!("weights {weight}, scene {kind}, noise {noise}: {:.3}", known / best);
+                assert!(known < 1.5 * best, "{weight}, {kind}, {noise}: {known}, {best}");
+            }
+        }
+    }
 }
