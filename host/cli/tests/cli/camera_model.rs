@@ -71,6 +71,7 @@ fn mistakes_in_a_description_are_told_in_one_line() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn the_one_metre_camera_shows_a_letter_at_one_metre_in_heavy_rain() {
     let bench = Bench::new();
     let demo = [

@@ -27,6 +27,7 @@ fn two_captures_started_at_once_make_two_recordings() {
 
 #[cfg(target_os = "linux")]
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_full_disk_is_told_with_the_frames_that_the_file_really_holds() {
     let bench = Bench::new();
     // 2 MB. The signal of the limit, which ends a program silently, is an error here.

@@ -32,6 +32,7 @@ enum Right {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn the_inputs_of_other_benches_are_read_as_their_readme_says() {
     use Right::{Image, Refusal, Warning};
     let Some(folder) = cases() else { return };
@@ -220,6 +221,7 @@ fn with_nan(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 /// Each file cut at many bytes, and with NaN: what its readers say of it is one line, or readings that are finite.
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_damaged_file_is_read_in_part_or_refused_in_one_line() {
     let bench = Bench::new();
     let orders = [None, Some(Order::Natural)];

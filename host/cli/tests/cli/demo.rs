@@ -78,6 +78,7 @@ fn scored_db(image: &[f32], truth: &[f32], quality: &serde_json::Value) -> f64 {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn images_are_shares_of_white_with_their_noise_and_the_fit_stands_beside_the_scores() {
     let bench = Bench::new();
     // A grey picture: a fit to the truth would hide a wrong scale.
@@ -118,6 +119,7 @@ fn images_are_shares_of_white_with_their_noise_and_the_fit_stands_beside_the_sco
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_flat_scene_has_a_noise_figure_and_its_own_grey() {
     let bench = Bench::new();
     bench.write("grey.png", &encode_grey(8, 8, &[0.4; 64], &provenance()));
@@ -148,6 +150,7 @@ fn a_flat_scene_has_a_noise_figure_and_its_own_grey() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn all_panels_show_one_field_on_one_scale() {
     let bench = Bench::new();
     let demo = ["demo", "--distance-m", "0.6", "--out", "demo", "--json"];
@@ -172,6 +175,7 @@ fn all_panels_show_one_field_on_one_scale() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn figures_show_the_panels_asked_for_at_the_width_asked_for() {
     let bench = Bench::new();
     let demo = ["demo", "--frames", "2", "--out", "demo", "--json"];
@@ -196,6 +200,7 @@ fn figures_show_the_panels_asked_for_at_the_width_asked_for() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn the_papers_rain_gives_way_to_other_weather() {
     let bench = Bench::new();
     bench.write("foggy.toml", b"name = \"foggy\"\n[weather]\nair = \"fog:5m\"");
@@ -212,6 +217,7 @@ fn the_papers_rain_gives_way_to_other_weather() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn the_light_is_the_same_at_every_share_and_no_frame_is_lost() {
     let bench = Bench::new();
     let demo = |options: &[&str]| {
@@ -235,6 +241,7 @@ fn the_light_is_the_same_at_every_share_and_no_frame_is_lost() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn far_out_of_focus_the_distance_tells_the_blur_and_too_little_light_is_said() {
     let bench = Bench::new();
     let run = |light| {
@@ -257,6 +264,7 @@ fn far_out_of_focus_the_distance_tells_the_blur_and_too_little_light_is_said() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_seed_gives_the_same_image_and_another_seed_another() {
     let bench = Bench::new();
     let image = |seed: &str| {
@@ -300,6 +308,7 @@ fn scenes_and_distances_that_cannot_be_leave_nothing_behind() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_far_letter_is_dim_and_never_inverted() {
     let bench = Bench::new();
     for (distance, least) in [("0.7", 0.3), ("1", 0.1)] {

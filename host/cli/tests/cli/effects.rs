@@ -151,6 +151,7 @@ fn an_emulated_board_finds_the_fpga_behind_its_tunnel() {
 
 /// At 0.5 m/s a letter of 43 mm goes on by 6.7 pixels in 20 ms.
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_target_that_moves_is_simulated_and_its_smear_is_said() {
     let bench = Bench::new();
     let capture = |name: &str, motion: &[&str]| {

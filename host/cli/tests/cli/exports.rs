@@ -246,6 +246,7 @@ pub fn exports(y: &[f32]) -> Vec<Export> {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn what_each_instrument_exports_is_an_image_and_a_note() {
     let (bench, measured) = (Bench::new(), Measured::new(16));
     for Export { file, text, field, note } in exports(&measured.natural()) {

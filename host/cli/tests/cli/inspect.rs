@@ -70,6 +70,7 @@ impl Natural {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn the_first_command_gives_the_image() {
     let scene = Natural::new();
     let (y, n) = (&scene.y, [512]);
@@ -238,6 +239,7 @@ fn patterns_traces_and_recordings_are_named_for_what_they_are() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn numbers_that_are_no_readings_get_no_way_that_fits() {
     let (bench, scene) = (Bench::new(), Natural::new());
     let mut state = 7_u32;
@@ -303,6 +305,7 @@ fn what_is_no_file_of_readings_is_one_line() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn the_files_of_other_benches_are_inspected_and_their_form_is_the_first() {
     let Some(folder) = cases() else { return };
     let bench = Bench::new();
@@ -379,6 +382,7 @@ fn a_simulated_file_is_called_simulated() {
 
 /// The readings of a feed, and what its header should say.
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_feed_is_judged_by_its_header_and_its_readings() {
     let (bench, natural) = (Bench::new(), Natural::new());
     let header = |form| format!("{{\"n\":16,\"order\":\"natural\",\"readings\":\"{form}\"}}\n");

@@ -118,6 +118,7 @@ fn a_file_name_that_is_no_utf_8_costs_its_own_image_alone() {
 
 #[cfg(target_os = "linux")]
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_full_disk_leaves_the_images_before_it_and_says_how_many() {
     use nirspi::files::{archive, npy};
     // More than are worked on together.

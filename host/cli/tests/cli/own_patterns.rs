@@ -326,6 +326,7 @@ fn patterns_and_readings_come_in_one_file_of_matlab() {
 
 /// All measurements of a file in one step: each image is the one that its measurement alone gives.
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn all_measurements_of_a_file_become_one_stack() {
     let bench = Bench::new();
     let (scene, weights, y) = of_size(12, 15, 160);

@@ -62,6 +62,7 @@ fn omp_predicts_what_was_not_measured_better_than_zero_does() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn every_method_predicts_a_phantom_better_than_zero_does_and_says_how() {
     let (bench, measured) = (Bench::new(), Measured::new(32));
     bench.write("in.npz", &measured.npz());

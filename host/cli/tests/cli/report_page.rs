@@ -314,6 +314,7 @@ fn the_page_of_reports_has_the_fields_of_reports() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn reports_of_every_kind_have_the_fields_of_the_page() {
     let (bench, schema) = (Bench::new(), schema());
     bench.write("a.npz", &Measured::new(32).npz());

@@ -38,6 +38,7 @@ fn a_self_test_keeps_a_calibration_that_capture_then_uses_and_names() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_calibration_of_another_camera_or_gateware_is_refused() {
     let bench = Bench::new();
     bench.run(&["camera", "selftest", "--calibration", "mine.json"]).succeeded();

@@ -93,6 +93,7 @@ fn misbehave(address: &str, bytes: &[u8]) -> Option<TcpStream> {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_page_goes_on_among_hundreds_of_clients_that_misbehave() {
     let bench = Bench::new();
     let server = serve(&bench, &["--method", "hadamard"]);

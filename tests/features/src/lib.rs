@@ -1,1 +1,0 @@
-//! Nothing: this package exists for the features of its dependencies. `generate.py` beside it says why.
