@@ -15,8 +15,8 @@ use super::report::{Reconstruction, Report};
 use super::{
     MatrixMethod, MatrixSettings, OmpSettings, ReconstructError, Recursive, Sparsity, Strength,
 };
+use crate::parallel;
 use crate::{Backend, Basis, Measurements};
-use rayon::prelude::*;
 use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -81,8 +81,8 @@ pub trait Reconstruct: Send + Sync {
         measurements: &[Measurements],
         going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        let one = |measured| going_on().and_then(|()| self.reconstruct(measured));
-        measurements.par_iter().map(one).collect()
+        let one = |measured: &Measurements| going_on().and_then(|()| self.reconstruct(measured));
+        parallel::try_map(measurements, one)
     }
 
     /// Whether the image of a measurement is the same alone and among others of its kind.

@@ -5,10 +5,10 @@
 
 use super::Problem;
 use crate::omp::OmpError;
+use crate::parallel;
 use crate::{Rows, order};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 
 /// The number of atoms that a pursuit stops at, and what is known of their prediction.
 #[derive(Debug, Clone, PartialEq)]
@@ -176,11 +176,12 @@ pub(super) fn choose_together(
     trusted: Trusted,
     predict: impl Fn(&Problem<'_>, &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<Together>, OmpError> {
-    let folded: Result<Option<Vec<Folded>>, OmpError> = problems
-        .par_iter()
-        .map(|problem| Folded::new(problem, folds, |kept| predict(problem, kept)))
-        .collect();
-    let Some(folded) = folded? else { return Ok(None) };
+    let folded = parallel::try_map(problems, |problem| {
+        Folded::new(problem, folds, &|kept| predict(problem, kept))
+    })?;
+    let Some(folded) = folded.into_iter().collect::<Option<Vec<Folded>>>() else {
+        return Ok(None);
+    };
     let mut total: Misses = vec![Default::default(); count];
     folded.iter().for_each(|folded| add(&mut total, &folded.total(count)));
     let (at, trust) = best(&total, trusted);
@@ -234,7 +235,7 @@ pub(super) fn choose_among(
     trusted: Trusted,
     predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<Chosen>, OmpError> {
-    let Some(folded) = Folded::new(problem, folds, predict)? else { return Ok(None) };
+    let Some(folded) = Folded::new(problem, folds, &predict)? else { return Ok(None) };
     let (at, trust) = best(&folded.total(count), trusted);
     Ok(Some(Chosen { at, trust, held_back: folded.held_back(problem, at) }))
 }
@@ -250,25 +251,22 @@ impl Folded {
     fn new(
         problem: &Problem<'_>,
         folds: usize,
-        predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+        predict: &(dyn Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync),
     ) -> Result<Option<Self>, OmpError> {
         let parts = parts(problem.rows, folds);
         if parts.is_empty() {
             return Ok(None);
         }
         let fine = finer_half(problem.rows);
-        let results: Result<Vec<Fold>, OmpError> = parts
-            .par_iter()
-            .map(|(kept, held)| {
-                let predictions = predict(kept)?;
-                let misses = misses_of(problem, &predictions, held, &fine);
-                let of_held = |predicted: &Vec<f32>| {
-                    held.iter().map(|&k| predicted[problem.rows[k] as usize]).collect()
-                };
-                Ok((misses, predictions.iter().map(of_held).collect()))
-            })
-            .collect();
-        Ok(Some(Self { parts, results: results? }))
+        let results = parallel::try_map(&parts, |(kept, held)| {
+            let predictions = predict(kept)?;
+            let misses = misses_of(problem, &predictions, held, &fine);
+            let of_held = |predicted: &Vec<f32>| {
+                held.iter().map(|&k| predicted[problem.rows[k] as usize]).collect()
+            };
+            Ok::<_, OmpError>((misses, predictions.iter().map(of_held).collect()))
+        })?;
+        Ok(Some(Self { parts, results }))
     }
 
     /// The misses of `count` candidates.
