@@ -8,7 +8,7 @@ export const MEANINGS = {
   "enhanced": "The image is enlarged and deblurred.",
   "inconsistency": "Distance between the readings and those that the enhanced image would give, divided by the noise of the readings. Near 1 or below, the readings support the image; far above, the network has invented something.",
   "late": "Frames that arrived after a later frame and were left out of the image.",
-  "load": "Share of the time in which the thread that reads the camera is busy. Above 85 %, the page shows fewer images, then without enhancement; every frame is still counted and recorded.",
+  "load": "Share of the time in which the thread that reads the camera is busy. Above 85 %, the page shows fewer images, and then leaves out the enhancement. Every frame is still counted and recorded.",
   "lost": "Frames that the camera made and that never arrived.",
   "noise": "Standard deviation of the noise of a pixel, estimated from the image, as a share of white.",
   "order": "Which rows of the Hadamard matrix are shown, and in which sequence.",
