@@ -62,7 +62,8 @@ pub struct Args {
     #[arg(long, requires = "matrix")]
     no_dark: bool,
     /// With --index all: start each frame from the frames before. omp starts from their atoms, as long as the result explains
-    /// the readings as well; the other methods from their patterns, moved with the scene and weighted by what is left of them
+    /// the readings as well. The other methods use the earlier images, moved with the scene: these count less the more the
+    /// scene has changed
     #[arg(long, conflicts_with_all = ["dictionary", "non_negative"])]
     warm_start: bool,
     /// Also enlarge and deblur an image of 32 x 32 or 64 x 64 pixels by networks (enhanced.npy and enhanced.png). The mean

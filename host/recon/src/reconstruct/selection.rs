@@ -10,6 +10,9 @@ use crate::{Rows, order};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+/// Every row of each candidate.
+type Predicted = Result<Vec<Vec<f32>>, OmpError>;
+
 /// The number of atoms that a pursuit stops at, and what is known of their prediction.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Choice {
@@ -174,7 +177,7 @@ pub(super) fn choose_together(
     count: usize,
     folds: usize,
     trusted: Trusted,
-    predict: impl Fn(&Problem<'_>, &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+    predict: impl Fn(&Problem<'_>, &[usize]) -> Predicted + Sync,
 ) -> Result<Option<Together>, OmpError> {
     let folded = parallel::try_map(problems, |problem| {
         Folded::new(problem, folds, &|kept| predict(problem, kept))
@@ -195,11 +198,7 @@ pub(super) fn sparsities(measurements: usize, most: usize) -> Vec<usize> {
 }
 
 /// What a pursuit predicts of all rows, from the measurements at some positions.
-pub(super) fn predict(
-    problem: &Problem<'_>,
-    kept: &[usize],
-    sparsities: &[usize],
-) -> Result<Vec<Vec<f32>>, OmpError> {
+pub(super) fn predict(problem: &Problem<'_>, kept: &[usize], sparsities: &[usize]) -> Predicted {
     let dictionary = problem.dictionary(kept);
     let found = problem.pursue(&dictionary, kept, sparsities)?;
     Ok(found.iter().map(|f| dictionary.predict(&f.support, &f.coefficients)).collect())
@@ -211,7 +210,7 @@ pub(super) fn choose_sparsity(
     problem: &Problem<'_>,
     most: usize,
     folds: usize,
-    predict: impl Fn(&[usize], &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+    predict: impl Fn(&[usize], &[usize]) -> Predicted + Sync,
 ) -> Result<Choice, OmpError> {
     let sparsities = sparsities(problem.rows.len(), most);
     let found = choose_among(problem, sparsities.len(), folds, OMP_TRUSTED, |kept| {
@@ -233,7 +232,7 @@ pub(super) fn choose_among(
     count: usize,
     folds: usize,
     trusted: Trusted,
-    predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
+    predict: impl Fn(&[usize]) -> Predicted + Sync,
 ) -> Result<Option<Chosen>, OmpError> {
     let Some(folded) = Folded::new(problem, folds, &predict)? else { return Ok(None) };
     let (at, trust) = best(&folded.total(count), trusted);
@@ -251,7 +250,7 @@ impl Folded {
     fn new(
         problem: &Problem<'_>,
         folds: usize,
-        predict: &(dyn Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync),
+        predict: &(dyn Fn(&[usize]) -> Predicted + Sync),
     ) -> Result<Option<Self>, OmpError> {
         let parts = parts(problem.rows, folds);
         if parts.is_empty() {
