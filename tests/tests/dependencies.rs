@@ -191,7 +191,11 @@ fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest()
     let packages: String =
         left_out.iter().map(|package| format!(" -p {}", name(package))).collect();
     let steps = std::fs::read_to_string(root().join(".ci/steps.sh")).unwrap();
-    assert_eq!(apart.len(), 2, "left out: the program for browsers, the model of the chip");
+    assert_eq!(
+        apart.len(),
+        3,
+        "left out: the program for browsers, the list of features, the model of the chip"
+    );
     assert!(
         steps.contains("-p nirspi-tests-silicon"),
         ".ci/steps.sh does not run the ELF on a model of its chip"
