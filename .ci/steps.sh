@@ -47,7 +47,7 @@ by_name=(
     "flash           probe-rs knows every board's chip, and the program its options"
     "mutations-all   every deliberate fault in the RTL is seen, and every law can be broken"
     "proofs-all      the same with every deliberate fault; PyPI"
-    "gpu-program     networks and the program on software Vulkan; Debian"
+    "gpu-program     stacks, networks and the program on software Vulkan; Debian"
     "cuda            tests of GPU kernels through CUDA, whose PTX runs on the processor; PyPI, 300 MB"
     "cuda-source     every GPU kernel compiles for NVIDIA's GPUs and keeps to its registers, without a GPU; PyPI, 300 MB"
     "mutants         deliberate faults in the Rust code are seen: in lines changed since main, or in MUTANTS='CRATE...'; crates.io"
@@ -134,12 +134,13 @@ step_test() {
 
 step_gpu() {
     software_vulkan
-    gpu_tests -p nirspi-gpu -p nirspi-omp -p nirspi-recon --features nirspi-recon/wgpu --lib -- omp:: gpu:: pursuit:: cache::
+    gpu_tests -p nirspi-gpu -p nirspi-omp --features nirspi-omp/wgpu --lib -- gpu:: pursuit:: cache::
 }
 
-# Networks and the program: both are built for this alone, and software Vulkan takes minutes for their kernels.
+# Stacks, networks and the program: they are built for this alone, and software Vulkan takes minutes for their kernels.
 step_gpu_program() {
     software_vulkan
+    gpu_tests -p nirspi-recon --features nirspi-recon/wgpu --lib -- omp::
     gpu_tests -p nirspi-nets --features nirspi-nets/wgpu --lib -- gpu:: networks:: agreement:: weights:: enhance::device
     gpu_tests -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
         omp:: gpu:: sparse_problems:: a_gpu_enhances the_whole_of_the_pipeline
