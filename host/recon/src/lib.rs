@@ -25,7 +25,6 @@ pub mod law;
 pub mod leak;
 mod measurements;
 pub mod metrics;
-mod parallel;
 pub mod reconstruct;
 mod repeats;
 #[cfg(test)]

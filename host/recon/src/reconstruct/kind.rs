@@ -11,8 +11,8 @@ pub(super) use regularised::regularised_kind;
 use super::selection::Together;
 use super::weight::KindWeights;
 use super::{HeldBack, Made, Problem, ReconstructError};
-use crate::parallel;
 use crate::{Measurements, Rows};
+use rayon::prelude::*;
 
 /// Whether long work goes on; [`ReconstructError::Stopped`] if the user has stopped it.
 pub type GoingOn<'g> = &'g (dyn Fn() -> Result<(), ReconstructError> + Sync);
@@ -47,7 +47,7 @@ impl Common {
     ) -> Result<Self, E> {
         let trust = chosen.trust;
         let mut weights = KindWeights::new(some[0].rows);
-        let predicted = parallel::try_map(some, with)?;
+        let predicted: Vec<Vec<f32>> = some.par_iter().map(with).collect::<Result<_, _>>()?;
         for ((problem, without), with) in some.iter().zip(&chosen.held_back).zip(&predicted) {
             let noise = problem.reading_noise();
             weights.add(
@@ -77,5 +77,5 @@ fn problems<'m>(
     problem: impl Fn(&'m Measurements) -> Problem<'m> + Sync,
 ) -> Vec<Problem<'m>> {
     let some: Vec<usize> = sample(measurements.len()).collect();
-    parallel::map(&some, |&k| problem(&measurements[k]))
+    some.into_par_iter().map(|k| problem(&measurements[k])).collect()
 }

@@ -15,8 +15,8 @@ use super::report::{Reconstruction, Report};
 use super::{
     MatrixMethod, MatrixSettings, OmpSettings, ReconstructError, Recursive, Sparsity, Strength,
 };
-use crate::parallel;
 use crate::{Backend, Basis, Measurements};
+use rayon::prelude::*;
 use std::fmt;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -75,14 +75,14 @@ pub trait Reconstruct: Send + Sync {
     /// before each.
     ///
     /// # Errors
-    /// As [`Reconstruct::reconstruct`], of the first measurement that has no image; or that of `going_on`.
+    /// As [`Reconstruct::reconstruct`], of one of the measurements that have no image; or that of `going_on`.
     fn reconstruct_kind(
         &self,
         measurements: &[Measurements],
         going_on: GoingOn<'_>,
     ) -> Result<Vec<Reconstruction>, ReconstructError> {
-        let one = |measured: &Measurements| going_on().and_then(|()| self.reconstruct(measured));
-        parallel::try_map(measurements, one)
+        let one = |measured| going_on().and_then(|()| self.reconstruct(measured));
+        measurements.par_iter().map(one).collect()
     }
 
     /// Whether the image of a measurement is the same alone and among others of its kind.

@@ -50,7 +50,6 @@ mod solvers;
 use super::Penalty;
 use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
-use crate::parallel;
 use crate::{Image, Shape, Size};
 pub use error::MatrixError;
 pub use live::LiveMatrix;
@@ -59,6 +58,7 @@ pub use noise::{KnownNoise, NoiseFrom};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use rayon::prelude::*;
 
 /// A user's own patterns, one in each row, of `height * width` weights each.
 #[derive(Debug, Clone)]
@@ -430,7 +430,7 @@ fn energies_if_orthogonal(patterns: &DMatrix<f64>) -> Option<DVector<f64>> {
 fn images(patterns: &DMatrix<f64>, make: impl Fn(&mut [f64]) -> Vec<f32> + Sync) -> DMatrix<f32> {
     let (count, area) = patterns.shape();
     let mut images = DMatrix::<f32>::zeros(area, count);
-    parallel::chunks(images.as_mut_slice(), area, |k, image| {
+    images.as_mut_slice().par_chunks_exact_mut(area).enumerate().for_each(|(k, image)| {
         let mut weights: Vec<f64> = patterns.row(k).iter().copied().collect();
         image.copy_from_slice(&make(&mut weights));
     });

@@ -5,13 +5,10 @@
 
 use super::Problem;
 use crate::omp::OmpError;
-use crate::parallel;
 use crate::{Rows, order};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-
-/// Every row of each candidate.
-type Predicted = Result<Vec<Vec<f32>>, OmpError>;
+use rayon::prelude::*;
 
 /// The number of atoms that a pursuit stops at, and what is known of their prediction.
 #[derive(Debug, Clone, PartialEq)]
@@ -177,14 +174,13 @@ pub(super) fn choose_together(
     count: usize,
     folds: usize,
     trusted: Trusted,
-    predict: impl Fn(&Problem<'_>, &[usize]) -> Predicted + Sync,
+    predict: impl Fn(&Problem<'_>, &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<Together>, OmpError> {
-    let folded = parallel::try_map(problems, |problem| {
-        Folded::new(problem, folds, &|kept| predict(problem, kept))
-    })?;
-    let Some(folded) = folded.into_iter().collect::<Option<Vec<Folded>>>() else {
-        return Ok(None);
-    };
+    let folded: Result<Option<Vec<Folded>>, OmpError> = problems
+        .par_iter()
+        .map(|problem| Folded::new(problem, folds, |kept| predict(problem, kept)))
+        .collect();
+    let Some(folded) = folded? else { return Ok(None) };
     let mut total: Misses = vec![Default::default(); count];
     folded.iter().for_each(|folded| add(&mut total, &folded.total(count)));
     let (at, trust) = best(&total, trusted);
@@ -198,7 +194,11 @@ pub(super) fn sparsities(measurements: usize, most: usize) -> Vec<usize> {
 }
 
 /// What a pursuit predicts of all rows, from the measurements at some positions.
-pub(super) fn predict(problem: &Problem<'_>, kept: &[usize], sparsities: &[usize]) -> Predicted {
+pub(super) fn predict(
+    problem: &Problem<'_>,
+    kept: &[usize],
+    sparsities: &[usize],
+) -> Result<Vec<Vec<f32>>, OmpError> {
     let dictionary = problem.dictionary(kept);
     let found = problem.pursue(&dictionary, kept, sparsities)?;
     Ok(found.iter().map(|f| dictionary.predict(&f.support, &f.coefficients)).collect())
@@ -210,7 +210,7 @@ pub(super) fn choose_sparsity(
     problem: &Problem<'_>,
     most: usize,
     folds: usize,
-    predict: impl Fn(&[usize], &[usize]) -> Predicted + Sync,
+    predict: impl Fn(&[usize], &[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Choice, OmpError> {
     let sparsities = sparsities(problem.rows.len(), most);
     let found = choose_among(problem, sparsities.len(), folds, OMP_TRUSTED, |kept| {
@@ -232,9 +232,9 @@ pub(super) fn choose_among(
     count: usize,
     folds: usize,
     trusted: Trusted,
-    predict: impl Fn(&[usize]) -> Predicted + Sync,
+    predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
 ) -> Result<Option<Chosen>, OmpError> {
-    let Some(folded) = Folded::new(problem, folds, &predict)? else { return Ok(None) };
+    let Some(folded) = Folded::new(problem, folds, predict)? else { return Ok(None) };
     let (at, trust) = best(&folded.total(count), trusted);
     Ok(Some(Chosen { at, trust, held_back: folded.held_back(problem, at) }))
 }
@@ -250,22 +250,25 @@ impl Folded {
     fn new(
         problem: &Problem<'_>,
         folds: usize,
-        predict: &(dyn Fn(&[usize]) -> Predicted + Sync),
+        predict: impl Fn(&[usize]) -> Result<Vec<Vec<f32>>, OmpError> + Sync,
     ) -> Result<Option<Self>, OmpError> {
         let parts = parts(problem.rows, folds);
         if parts.is_empty() {
             return Ok(None);
         }
         let fine = finer_half(problem.rows);
-        let results = parallel::try_map(&parts, |(kept, held)| {
-            let predictions = predict(kept)?;
-            let misses = misses_of(problem, &predictions, held, &fine);
-            let of_held = |predicted: &Vec<f32>| {
-                held.iter().map(|&k| predicted[problem.rows[k] as usize]).collect()
-            };
-            Ok::<_, OmpError>((misses, predictions.iter().map(of_held).collect()))
-        })?;
-        Ok(Some(Self { parts, results }))
+        let results: Result<Vec<Fold>, OmpError> = parts
+            .par_iter()
+            .map(|(kept, held)| {
+                let predictions = predict(kept)?;
+                let misses = misses_of(problem, &predictions, held, &fine);
+                let of_held = |predicted: &Vec<f32>| {
+                    held.iter().map(|&k| predicted[problem.rows[k] as usize]).collect()
+                };
+                Ok((misses, predictions.iter().map(of_held).collect()))
+            })
+            .collect();
+        Ok(Some(Self { parts, results: results? }))
     }
 
     /// The misses of `count` candidates.

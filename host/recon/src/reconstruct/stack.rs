@@ -22,8 +22,8 @@ use super::noise;
 use super::{Reconstruct, ReconstructError, Reconstruction};
 use crate::Measurements;
 use crate::measurements::Kind;
-use crate::parallel;
 use crate::repeats::noise_of_repeats;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
@@ -78,7 +78,7 @@ fn part_of_stack(
         positions.into_iter().zip(images).for_each(|(k, image)| made[k] = Some(image));
     }
     let one = |&k: &usize| going_on().and_then(|()| method.reconstruct(&measurements[k]));
-    let images = parallel::try_map(&alone, one)?;
+    let images: Vec<Reconstruction> = alone.par_iter().map(one).collect::<Result<_, _>>()?;
     alone.into_iter().zip(images).for_each(|(k, image)| made[k] = Some(image));
     Ok(made.into_iter().flatten().collect())
 }
@@ -89,8 +89,8 @@ pub(super) fn each(
     measurements: &[Measurements],
     going_on: GoingOn<'_>,
 ) -> Result<Vec<Reconstruction>, ReconstructError> {
-    let one = |measured: &Measurements| going_on().and_then(|()| method.reconstruct(measured));
-    parallel::try_map(measurements, one)
+    let one = |measured| going_on().and_then(|()| method.reconstruct(measured));
+    measurements.par_iter().map(one).collect()
 }
 
 /// The positions of each kind, and of the measurements that are made by themselves.
@@ -138,7 +138,7 @@ pub(super) fn with_common_noise(measurements: &[Measurements]) -> Cow<'_, [Measu
 /// Measurements of one kind, with the noise and the falloff that they have in common.
 pub(super) fn with_statistics(measurements: &[Measurements]) -> Vec<Measurements> {
     let some: Vec<usize> = sample(measurements.len()).collect();
-    let found: Vec<Kind> = parallel::map(&some, |&k| noise::estimated(&measurements[k]));
+    let found: Vec<Kind> = some.par_iter().map(|&k| noise::estimated(&measurements[k])).collect();
     let falloff = found.iter().map(|kind| kind.falloff).sum::<f64>() / found.len() as f64;
     let middle = |mut of_some: Vec<f64>| {
         of_some.sort_unstable_by(f64::total_cmp);
@@ -282,8 +282,8 @@ mod tests {
                 let rows = Order::ZigZag.rows(side).unwrap().first((share * 1024.0) as usize);
                 let frames: Vec<_> = (0..10).map(|k| noisy(&rows, &scene, noise, k)).collect();
                 let method = method.prepare(&MethodSettings::default()).unwrap();
-                let alone = parallel::map(&frames, |frame| method.reconstruct(frame).unwrap());
-                let alone = error(&alone, &scene);
+                let alone = frames.par_iter().map(|frame| method.reconstruct(frame).unwrap());
+                let alone = error(&alone.collect::<Vec<_>>(), &scene);
                 let together = error(&stack(&*method, &frames).unwrap(), &scene);
                 let name = method.name();
                 assert!(

@@ -2,12 +2,12 @@
 
 use super::{Common, GoingOn, problems};
 use crate::Measurements;
-use crate::parallel;
 use crate::reconstruct::regularised::STRENGTHS;
 use crate::reconstruct::{
     Problem, ReconstructError, Regularised, RegularisedSettings, Strength, selection,
 };
 use crate::words;
+use rayon::prelude::*;
 
 /// The images of measurements of one kind; `None` if nothing can be held back.
 pub(in super::super) fn regularised_kind(
@@ -58,5 +58,5 @@ pub(in super::super) fn regularised_kind(
             noise: problem.noise_in_units(),
         })
     };
-    parallel::try_map(measurements, image).map(Some)
+    measurements.par_iter().map(image).collect::<Result<Vec<_>, _>>().map(Some)
 }

@@ -13,10 +13,10 @@ use super::solvers::{ITERATIONS, SETTLED};
 use super::{DarkLevel, MatrixSettings, OwnMatrix, STRENGTHS, energies, images, last_as_good};
 use crate::Size;
 use crate::basis::{Basis, Transform};
-use crate::parallel;
 use crate::reconstruct::noise;
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
 
 /// Part of the patterns' norm below which what is left of them is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -304,8 +304,8 @@ impl Part {
 fn product(matrix: &DMatrix<f64>, vectors: &[&DVector<f64>]) -> Vec<DVector<f64>> {
     let size = matrix.nrows();
     let vectors: Vec<&[f64]> = vectors.iter().map(|vector| vector.as_slice()).collect();
-    let rows: Vec<&[f64]> = matrix.as_slice().chunks_exact(size).collect();
-    let rows = parallel::map(&rows, |row| Arch::new().dispatch(Dots { row, vectors: &vectors }));
+    let dots = |row| Arch::new().dispatch(Dots { row, vectors: &vectors });
+    let rows: Vec<Vec<f64>> = matrix.as_slice().par_chunks_exact(size).map(dots).collect();
     let of = |at: usize| DVector::from_iterator(size, rows.iter().map(|row| row[at]));
     (0..vectors.len()).map(of).collect()
 }

@@ -1,7 +1,7 @@
 //! Gram matrices of many patterns: inner products of all pairs, on all threads.
 
-use crate::parallel;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows and columns of a block that one thread computes.
@@ -14,16 +14,18 @@ const CHUNK: usize = 1024;
 pub(super) fn gram(images: &DMatrix<f32>) -> DMatrix<f64> {
     let count = images.ncols();
     let mut products = DMatrix::<f64>::zeros(count, count);
-    parallel::chunks(products.as_mut_slice(), count.max(1) * BLOCK, |at, columns| {
-        let ours = at * BLOCK..((at + 1) * BLOCK).min(count);
-        for first in (ours.start..count).step_by(BLOCK) {
-            let others = first..(first + BLOCK).min(count);
-            let block = block(images, others.clone(), ours.clone());
-            for (k, column) in columns.chunks_exact_mut(count).enumerate() {
-                column[others.clone()].copy_from_slice(block.column(k).as_slice());
+    products.as_mut_slice().par_chunks_mut(count.max(1) * BLOCK).enumerate().for_each(
+        |(at, columns)| {
+            let ours = at * BLOCK..((at + 1) * BLOCK).min(count);
+            for first in (ours.start..count).step_by(BLOCK) {
+                let others = first..(first + BLOCK).min(count);
+                let block = block(images, others.clone(), ours.clone());
+                for (k, column) in columns.chunks_exact_mut(count).enumerate() {
+                    column[others.clone()].copy_from_slice(block.column(k).as_slice());
+                }
             }
-        }
-    });
+        },
+    );
     products.fill_upper_triangle_with_lower_triangle();
     products
 }
@@ -67,7 +69,7 @@ pub(super) fn are_independent(mut gram: DMatrix<f64>, least: f64) -> bool {
         }
         // What the images after these have along these is taken from their products.
         let rest = &mut gram.as_mut_slice()[after.start * size..];
-        parallel::chunks(rest, size * BLOCK, |at, columns| {
+        rest.par_chunks_mut(size * BLOCK).enumerate().for_each(|(at, columns)| {
             let start = at * BLOCK;
             let count = columns.len() / size;
             let ours = panel.columns(start, count);

@@ -15,8 +15,8 @@ use super::{
 };
 use crate::Image;
 use crate::omp::Stop;
-use crate::parallel;
 use nalgebra::DVector;
+use rayon::prelude::*;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Measurements by the same patterns, which were checked.
@@ -115,9 +115,9 @@ impl<'m> Many<'m> {
         let made: Vec<Made> = match method {
             _ if first.is_some() => {
                 let solve = |at: &usize| complete::solve(self.own, self.all[*at], &settings);
-                let found = parallel::map(which, solve).into_iter().flatten();
+                let found: Vec<_> = which.par_iter().filter_map(solve).collect();
                 let made = |(fit, strength)| Made { fit, strength: Some(strength), atoms: None };
-                found.map(made).collect()
+                found.into_iter().map(made).collect()
             }
             MatrixMethod::PseudoInverse => {
                 let inverse = PseudoInverse::new(self.own, settings.dark);
@@ -126,7 +126,7 @@ impl<'m> Many<'m> {
                     strength: None,
                     atoms: None,
                 };
-                parallel::map(which, made)
+                which.par_iter().map(made).collect()
             }
             MatrixMethod::Omp => self.pursued(which)?,
             MatrixMethod::Best | MatrixMethod::Penalty(Penalty::Tikhonov)
@@ -192,13 +192,12 @@ impl<'m> Many<'m> {
             }
         };
         let prepared = self.whole(MatrixMethod::Penalty(penalty))?;
-        let made = |&(&at, strengths): &(&usize, &Vec<f64>)| {
-            let problem = prepared.problem(self.all[at]);
+        let made = |(at, strengths): (&usize, &Vec<f64>)| {
+            let problem = prepared.problem(self.all[*at]);
             let fit = problem.penalised(penalty, strengths).swap_remove(strengths.len() - 1);
             Made { fit, strength: strengths.last().copied(), atoms: None }
         };
-        let problems: Vec<_> = which.iter().zip(&strengths).collect();
-        Ok(parallel::map(&problems, made))
+        Ok(which.par_iter().zip(&strengths).map(made).collect())
     }
 
     fn pursued(&self, which: &[usize]) -> Result<Vec<Made>, MatrixError> {
@@ -250,12 +249,12 @@ impl<'m> Many<'m> {
         different.dedup();
         for noise in different {
             let pursuit = prepared.pursuit(noise);
-            let same: Vec<usize> = (0..which.len()).filter(|&k| noises[k] == noise).collect();
-            let made = parallel::try_map(&same, |&k| {
+            let places = found.par_iter_mut().enumerate().filter(|(k, _)| noises[*k] == noise);
+            places.try_for_each(|(k, place)| {
                 let problem = prepared.problem(self.all[which[k]]);
-                problem.omp(&pursuit, &sparsities(k), self.settings.non_negative)
+                *place = problem.omp(&pursuit, &sparsities(k), self.settings.non_negative)?;
+                Ok::<_, MatrixError>(())
             })?;
-            same.into_iter().zip(made).for_each(|(k, made)| found[k] = made);
         }
         Ok(found)
     }
@@ -273,7 +272,7 @@ impl<'m> Many<'m> {
         self.errors(MatrixMethod::Penalty(penalty), which, |prepared| {
             let images =
                 |at: &usize| prepared.problem(self.all[*at]).penalised(penalty, &STRENGTHS);
-            Ok(parallel::map(which, images))
+            Ok(which.par_iter().map(images).collect())
         })
     }
 }
@@ -308,19 +307,14 @@ impl Many<'_> {
         for (kept, held) in folds(self.own.patterns()) {
             let images = predict(&self.prepared(method, kept)?)?;
             let patterns = self.own.patterns.select_rows(&held);
-            let tried: Vec<_> = which.iter().zip(&images).collect();
-            let missed = parallel::map(&tried, |&(&at, images)| {
-                let y = DVector::from_iterator(held.len(), held.iter().map(|&k| self.all[at][k]));
-                let error = |image: &T| {
+            errors.par_iter_mut().zip(which).zip(images).for_each(|((errors, at), images)| {
+                errors.resize(images.len(), 0.0);
+                let y = DVector::from_iterator(held.len(), held.iter().map(|&k| self.all[*at][k]));
+                for (error, image) in errors.iter_mut().zip(&images) {
                     let Fit { pixels, dark } = image.fit();
-                    (&y - &patterns * pixels).add_scalar(-dark.value()).norm_squared()
-                };
-                images.iter().map(error).collect::<Errors>()
+                    *error += (&y - &patterns * pixels).add_scalar(-dark.value()).norm_squared();
+                }
             });
-            for (errors, missed) in errors.iter_mut().zip(missed) {
-                errors.resize(missed.len(), 0.0);
-                errors.iter_mut().zip(missed).for_each(|(error, missed)| *error += missed);
-            }
         }
         Ok(errors)
     }

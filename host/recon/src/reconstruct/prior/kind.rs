@@ -5,10 +5,10 @@ use super::{
     Seen, SharedNetwork, believe, completable, image, support, with_network, without_each,
 };
 use crate::Measurements;
-use crate::parallel;
 use crate::reconstruct::kind::{GoingOn, sample};
 use crate::reconstruct::weight::KindWeights;
 use crate::reconstruct::{HeldBack, ReconstructError, Reconstruction, Report, noise};
+use rayon::prelude::*;
 
 /// What is known of one measurement of the sample.
 struct Tried {
@@ -32,10 +32,13 @@ pub(in super::super) fn network_kind(
     }
     let complete = |seen: &Seen| network.complete(seen).map_err(ReconstructError::Failed);
     let some: Vec<usize> = sample(measurements.len()).collect();
-    let trusts = parallel::try_map(&some, |&k| match completable(&measurements[k]) {
-        Ok(_) => support(&measurements[k], complete).map(Some),
-        Err(_) => Ok(None),
-    })?;
+    let trusts: Vec<Option<f32>> = some
+        .par_iter()
+        .map(|&k| match completable(&measurements[k]) {
+            Ok(_) => support(&measurements[k], complete).map(Some),
+            Err(_) => Ok(None),
+        })
+        .collect::<Result<_, ReconstructError>>()?;
     let Some(mut trusts) = trusts.into_iter().collect::<Option<Vec<f32>>>() else {
         return Ok(None);
     };
@@ -52,7 +55,8 @@ pub(in super::super) fn network_kind(
         let noise = seen.in_units(noise::estimated_noise(&measurements[k]));
         Ok(Some(Tried { seen, noise, without, with }))
     };
-    let tried = parallel::try_map::<_, _, ReconstructError>(&some, tried)?;
+    let tried: Vec<Option<Tried>> =
+        some.par_iter().map(tried).collect::<Result<_, ReconstructError>>()?;
     let rows = first.rows();
     let (mut weights, mut judged) = (KindWeights::new(rows), Vec::new());
     for Tried { seen, noise, without, with } in tried.iter().flatten() {
@@ -79,5 +83,5 @@ pub(in super::super) fn network_kind(
         report.residual = Some(seen.residual(&grid));
         Ok(Reconstruction { image: image(&seen, grid), report })
     };
-    parallel::try_map(measurements, made).map(Some)
+    measurements.par_iter().map(made).collect::<Result<Vec<_>, _>>().map(Some)
 }
