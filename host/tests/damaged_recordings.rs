@@ -5,7 +5,9 @@
 use nirspi::account::LossCounters;
 use nirspi::causes::in_one_line;
 use nirspi::identity::CameraIdentity;
-use nirspi::recording::{Recorder, Recording, RunAccount, Target, recover, tally_recording};
+use nirspi::recording::{
+    Opening, Recorder, Recording, RunAccount, Target, recover, tally_recording,
+};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
@@ -30,7 +32,8 @@ fn recorded(folder: &Path) -> PathBuf {
     };
     let setup = MeasurementSetup::new(&Order::CakeCutting, 0.05).unwrap();
     let target = Target::New(path.clone());
-    let mut recorder = Recorder::create(&target, &identity, &setup, None, Some(RUN)).unwrap();
+    let opening = Opening::of(&identity, &setup, RUN);
+    let mut recorder = Recorder::create(&target, &opening).unwrap();
     for sequence in 0..FRAMES {
         let mut buffer = vec![0; 4 * setup.rows.len()];
         let values = (0..setup.rows.len() as i32).map(|k| i64::from(k * 77 - sequence as i32 * 13));

@@ -5,7 +5,7 @@
 use nirspi::address::CameraAddress;
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
 use nirspi::identity::CameraIdentity;
-use nirspi::recording::{Recorder, Recording, RunAccount, Target, tally_recording};
+use nirspi::recording::{Opening, Recorder, Recording, RunAccount, Target, tally_recording};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
@@ -51,7 +51,8 @@ fn recorded(folder: &Path, is_whole: bool) -> PathBuf {
     setup.adc_latency = 6;
     let patterns = setup.rows.len();
     let target = Target::New(path.clone());
-    let mut recorder = Recorder::create(&target, &identity, &setup, None, Some(RUN)).unwrap();
+    let opening = Opening::of(&identity, &setup, RUN);
+    let mut recorder = Recorder::create(&target, &opening).unwrap();
     for sequence in 0..FRAMES {
         let mut bytes = frame(sequence, patterns);
         match sequence {
@@ -92,6 +93,7 @@ fn replay(path: &Path, speed: &str, frames: Option<u32>, record: Option<&Path>) 
         frames,
         calibration: Calibration::Measure,
         record: record.map(|path| Target::New(path.to_owned())),
+        made: None,
     };
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
@@ -196,6 +198,7 @@ fn a_replay_that_is_stopped_loses_no_frame() {
         frames: None,
         calibration: Calibration::None,
         record: None,
+        made: None,
     };
     let captured =
         capture(&mut session, &options, &mut |progress| match progress.counters.received {

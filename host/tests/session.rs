@@ -182,6 +182,7 @@ fn capture_of(
         frames: Some(frames),
         calibration: Calibration::None,
         record,
+        made: None,
     };
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(()))
 }

@@ -9,8 +9,10 @@ use nirspi::capture::{
     observe,
 };
 use nirspi::identity::CameraIdentity;
+use nirspi::provenance::Made;
 use nirspi::recording::{
-    Part, Recorder, Recording, RecordingInfo, RunAccount, Split, Target, recover, tally_recording,
+    Opening, Part, Recorder, Recording, RecordingInfo, RunAccount, Split, Target, recover,
+    tally_recording,
 };
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
@@ -23,6 +25,16 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 const RUN: u16 = 7;
+
+fn made() -> Made {
+    Made::by(
+        "nirspi 0.1.0",
+        Some("0123456789ab"),
+        ["nirspi", "capture", "--frames", "9"],
+        1_764_059_400,
+    )
+}
+
 /// About 5 MB.
 const FRAMES: u32 = 5000;
 const FRAME_US: u64 = 10_000;
@@ -40,7 +52,8 @@ fn recorded(path: &Path, frames: u32, is_damaged: bool) {
     let setup = MeasurementSetup::new(&Order::CakeCutting, 0.25).unwrap();
     let patterns = setup.rows.len();
     let target = Target::New(path.to_owned());
-    let mut recorder = Recorder::create(&target, &identity, &setup, None, Some(RUN)).unwrap();
+    let opening = Opening::of(&identity, &setup, RUN);
+    let mut recorder = Recorder::create(&target, &opening).unwrap();
     for sequence in 0..frames {
         let mut buffer = vec![0; 4 * patterns];
         let values = (0..patterns as i32).map(|k| i64::from(sequence) * 1000 - 7 * i64::from(k));
@@ -110,7 +123,13 @@ fn capture_of(
     let address: CameraAddress = format!("replay:{camera}").parse().unwrap();
     let mut session = address.open(|| Err("no virtual camera here")).unwrap();
     let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-    let options = CaptureOptions { setup, frames, calibration: Calibration::None, record };
+    let options = CaptureOptions {
+        setup,
+        frames,
+        calibration: Calibration::None,
+        record,
+        made: Some(made()),
+    };
     observe(&mut session, &options, &mut disturbing)
 }
 
@@ -185,6 +204,10 @@ fn the_files_of_a_run_have_each_packet_once_and_each_is_a_whole_recording() {
     let sent: Vec<Vec<u8>> = bytes(packets(&whole)).collect();
     let found: Vec<Vec<u8>> = files.iter().flat_map(|path| bytes(packets(path))).collect();
     assert!(found == sent, "{} packets of {}", found.len(), sent.len());
+    // Each file says who wrote it.
+    for path in files {
+        assert_eq!(RecordingInfo::read(path).unwrap().written_by, Some(made()));
+    }
     // Each file says what it lacks itself, and the last one how the run ended.
     for account in &accounts {
         assert!(account.missing.as_ref().unwrap().contains("corrupt"), "{account:?}");
@@ -208,8 +231,11 @@ fn the_files_of_a_run_have_each_packet_once_and_each_is_a_whole_recording() {
     let recovered = folder.path().join("recovered.mcap");
     assert_eq!(recover(middle, &recovered, false).unwrap().frames, tally.account().counters());
     let info = RecordingInfo::read(&recovered).unwrap();
+    assert_eq!(info.written_by, Some(made()));
     assert_eq!(info.part.as_ref().unwrap().number, 2);
     let info = info.to_string();
+    let written = "written by nirspi 0.1.0, 2025-11-25T08:30:00Z: nirspi capture --frames 9";
+    assert!(info.contains(written), "{info}");
     let first = tally.account().first();
     let place = format!(
         "file 2 of its run, from frame {first} on, after rec-0001.mcap, goes on in rec-0003.mcap"

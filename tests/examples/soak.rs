@@ -128,6 +128,7 @@ fn session(
         frames: Some(SESSION),
         calibration: Calibration::None,
         record: Some(Target::New(recording.clone())),
+        made: None,
     };
     let captured =
         capture(&mut Session::open(Box::new(link))?, &options, &mut |_| ControlFlow::Continue(()))?;

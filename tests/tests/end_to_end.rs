@@ -51,7 +51,7 @@ fn optics() -> VirtualOptics {
 fn options(order: &Order, calibrate: bool) -> CaptureOptions {
     let setup = MeasurementSetup::new(order, 1.0).unwrap();
     let calibration = if calibrate { Calibration::Measure } else { Calibration::None };
-    CaptureOptions { setup, frames: Some(FRAMES), calibration, record: None }
+    CaptureOptions { setup, frames: Some(FRAMES), calibration, record: None, made: None }
 }
 
 fn run(link: Box<dyn Link>, options: &CaptureOptions) -> Capture {
@@ -274,6 +274,7 @@ fn a_frame_of_one_sweep_is_corrected_by_what_its_run_tells() {
         frames: Some(32),
         calibration: Calibration::Kept(settling),
         record: Some(Target::New(path.clone())),
+        made: None,
     };
     run(Box::new(MemoryLink::new(optics.camera(1).unwrap())), &options);
     let mut recording = Recording::open(&path).unwrap();

@@ -135,6 +135,7 @@ fn recording() -> Vec<u8> {
         frames: Some(4),
         calibration: Calibration::None,
         record: Some(Target::New(path.clone())),
+        made: None,
     };
     capture(&mut session(), &options, &mut |_| ControlFlow::Continue(())).unwrap();
     std::fs::read(path).unwrap()

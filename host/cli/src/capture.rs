@@ -115,6 +115,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         frames,
         calibration: choice.calibration.clone(),
         record: Some(target),
+        made: Some(provenance::made().clone()),
     };
     let bar = progress::Progress::new("capture", frames.map(u64::from), "frames");
     let mut seen = String::new();

@@ -68,8 +68,12 @@ const FEATURES: &[(&str, bool)] = &[
     ("wgpu", cfg!(feature = "wgpu")),
 ];
 
+/// The first twelve digits of the commit of the sources. `None` in builds without optimisation, and where the build script
+/// finds neither git nor a published package.
+pub const COMMIT: Option<&str> = option_env!("NIRSPI_COMMIT");
+
 static VERSION: LazyLock<String> =
-    LazyLock::new(|| About::this_build(option_env!("NIRSPI_COMMIT"), FEATURES).to_string());
+    LazyLock::new(|| About::this_build(COMMIT, FEATURES).to_string());
 
 /// nirspi, an open near-infrared single-pixel camera
 #[derive(Debug, Parser)]

@@ -14,7 +14,7 @@ pub fn begin(arguments: &[OsString]) {
     let program = concat!("nirspi ", env!("CARGO_PKG_VERSION"));
     let first = arguments.first();
     let arguments = arguments.iter().map(|argument| argument.to_string_lossy());
-    let _ = MADE.set(Made::now(program, option_env!("NIRSPI_COMMIT"), arguments));
+    let _ = MADE.set(Made::now(program, crate::COMMIT, arguments));
     // In Python, the executable is the interpreter.
     let own = std::env::current_exe().ok();
     let own = own.filter(|path| path.file_stem().is_some_and(|name| name == "nirspi"));

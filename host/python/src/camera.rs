@@ -11,7 +11,7 @@ mod run;
 pub use run::Run;
 
 use crate::errors::{of_opening, refusal, refused};
-use crate::made::said;
+use crate::made::{made, said};
 use crate::work::long;
 use nirspi::address::CameraAddress;
 use nirspi::capture::CalibrationPolicy;
@@ -19,7 +19,7 @@ use nirspi::capture::{Calibration, CaptureError, CaptureOptions};
 use nirspi::causes::in_one_line;
 use nirspi::frame_time::HostClock;
 use nirspi::link::Link;
-use nirspi::provenance::Taken;
+use nirspi::provenance::{Made, Taken};
 use nirspi::recording::Target;
 use nirspi::response::Settling;
 use nirspi::session::{IgnorePackets, Session, SessionError};
@@ -239,8 +239,9 @@ impl Camera {
         if wanted.frames == Some(0) {
             return Err(refused("frames is 0, expected at least 1"));
         }
+        let made = made(py)?;
         let session = self.take()?;
-        let (options, flat) = match self.options(&session, &wanted) {
+        let (options, flat) = match self.options(&session, &wanted, made) {
             Ok(found) => found,
             Err(error) => {
                 put_back(&self.state, session);
@@ -316,6 +317,7 @@ impl Camera {
         &self,
         session: &Session,
         wanted: &Wanted,
+        made: Made,
     ) -> PyResult<(CaptureOptions, Option<nirspi::calibration::FlatField>)> {
         let setup = self.setup.clone();
         let mut flat = self.flat.clone();
@@ -335,7 +337,8 @@ impl Camera {
             true => Target::Replace(path.clone()),
             false => Target::New(path.clone()),
         });
-        Ok((CaptureOptions { setup, frames: wanted.frames, calibration, record }, flat))
+        let (frames, made) = (wanted.frames, Some(made));
+        Ok((CaptureOptions { setup, frames, calibration, record, made }, flat))
     }
 }
 

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 pub fn made(py: Python<'_>) -> PyResult<Made> {
     let arguments: Vec<String> = py.import("sys")?.getattr("argv")?.extract()?;
     let program = concat!("nirspi for Python ", env!("CARGO_PKG_VERSION"));
-    Ok(Made::now(program, None, arguments))
+    Ok(Made::now(program, nirspi_cli::COMMIT, arguments))
 }
 
 /// Where readings come from, as JSON.

@@ -113,6 +113,13 @@ def test_a_recording_as_a_sum_and_frame_by_frame(cli, tmp_path):
     assert same(ns.reconstruct(frames, method="hadamard"), np.load(tmp_path / "all/image.npy"))
 
 
+def test_pictures_name_the_commit_that_the_program_names(cli, wing):
+    line = next(line for line in run(cli, "--version").splitlines() if line.startswith("commit: "))
+    commit = line.removeprefix("commit: ")
+    said = "null" if commit.startswith("not known") else f'"{commit}"'
+    assert f'"commit":{said}'.encode() in ns.reconstruct(ns.load(wing), method="hadamard").png()
+
+
 def test_rain_and_spheres(cli):
     report = json.loads(run(cli, "physics", "rain", "--rate-mm-h", "5.6", "--drops", "mono:2", "--json"))
     assert report.pop("provenance")["origin"] == "simulated"

@@ -44,6 +44,7 @@ use nirspi_camera::setup::MeasurementSetup;
 use nirspi_files::clock::Instant;
 use nirspi_files::identity::CameraIdentity;
 use nirspi_files::interrupt::Signal;
+use nirspi_files::provenance::Made;
 use nirspi_wire::{DeviceMessage, Fault, Frame, Status};
 use std::io;
 use std::ops::ControlFlow;
@@ -63,6 +64,8 @@ pub struct CaptureOptions {
     pub calibration: Calibration,
     /// The target of a recording.
     pub record: Option<Target>,
+    /// The program, for the provenance in a recording. Without it, the recording does not say who wrote it.
+    pub made: Option<Made>,
 }
 
 /// The source of a capture's latency and settling.

@@ -20,6 +20,7 @@ use nirspi::capture::{
 use nirspi::clock::Instant;
 use nirspi::events::{self, Level};
 use nirspi::integrate::Newest;
+use nirspi::provenance::Made;
 use nirspi::recording::Target;
 use nirspi::response::Settling;
 use nirspi::session::{IgnorePackets, Listener, Session, SessionError, request};
@@ -222,6 +223,8 @@ pub(super) struct Live {
     /// The setup of the command line, with the timing for all runs.
     base: MeasurementSetup,
     record_to: Option<PathBuf>,
+    /// The program, for the provenance in recordings.
+    made: Option<Made>,
     /// The plan of the current run.
     plan: Plan,
     /// The serial number and the response of the camera, if a run has measured the response.
@@ -258,6 +261,7 @@ impl Live {
             model: source.model.clone(),
             base: source.setup.clone(),
             record_to: source.record_to.take(),
+            made: None,
             plan: Plan::default(),
             known: None,
             earlier: LossCounters::default(),
@@ -273,10 +277,11 @@ impl Live {
         }
     }
 
-    /// The same on a thread of its own, whose load decides what the page gives up.
+    /// The same on a thread of its own, whose load decides what the page gives up. `made` is the program, for the
+    /// provenance in recordings.
     #[cfg(feature = "server")]
-    pub(super) fn with_load(self) -> Self {
-        Self { load: Some((Instant::now(), Duration::ZERO)), ..self }
+    pub(super) fn on_its_thread(self, made: Made) -> Self {
+        Self { load: Some((Instant::now(), Duration::ZERO)), made: Some(made), ..self }
     }
 
     /// Takes the load since the last time.
@@ -386,7 +391,8 @@ impl Live {
             }
             (calibration, _) => calibration.clone(),
         };
-        CaptureOptions { setup, frames: None, calibration, record: folder.map(Target::FirstFree) }
+        let (record, made) = (folder.map(Target::FirstFree), self.made.clone());
+        CaptureOptions { setup, frames: None, calibration, record, made }
     }
 
     /// Records the end of a run. `None` if the run was stopped from here. Fails only if the run is

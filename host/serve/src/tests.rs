@@ -31,6 +31,10 @@ use tokio::sync::watch;
 /// The longest wait of a test, enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(30);
 
+fn made() -> Made {
+    Made::by("nirspi 0.1.0", Some("0123456789ab"), ["nirspi", "serve"], 1_764_059_400)
+}
+
 fn setup() -> MeasurementSetup {
     MeasurementSetup::new(&Order::CakeCutting, 0.125).unwrap()
 }
@@ -179,7 +183,7 @@ impl Lab {
                 record_to: None,
                 connect,
             };
-            std::thread::spawn(move || measure(&shared, source, first))
+            std::thread::spawn(move || measure(&shared, source, first, made()))
         };
         let lab = Self { hands, shared, measuring };
         until("measuring", || lab.received() > 10);
@@ -319,12 +323,7 @@ impl Paper {
     fn new() -> Self {
         let shared = shared(enclosed(&Arc::default(), Before::Nothing).session.identity(), None);
         let (publish, published) = watch::channel(Arc::new(Published::default()));
-        let server = Server::bind(
-            "127.0.0.1:0",
-            Access::default(),
-            &Made::by("nirspi 0.1.0", Some("0123456789ab"), ["nirspi", "serve"], 1_764_059_400),
-        )
-        .unwrap();
+        let server = Server::bind("127.0.0.1:0", Access::default(), &made()).unwrap();
         let address = server.address;
         let serving = {
             let shared = Arc::clone(&shared);

@@ -20,6 +20,7 @@ use super::state::Published;
 use super::{CameraSource, Connected, Imaging, Ledger, Server, Shared, http, lock};
 use nirspi::capture::{CaptureError, observe};
 use nirspi::causes;
+use nirspi::provenance::Made;
 use nirspi::session::{Session, SessionError};
 use std::fmt;
 use std::io;
@@ -87,7 +88,8 @@ pub fn serve(
     let offer = Offer { records, base: Some(camera.setup.clone()), ..imaging.offer() };
     let stage = Stage::of(camera.scene.take());
     let shared = Arc::new(Shared::new(log, offer, settings, stage));
-    let measure = move |shared: &Arc<Shared>| measure(shared, camera, connected);
+    let made = server.made.clone();
+    let measure = move |shared: &Arc<Shared>| measure(shared, camera, connected, made);
     run(server, shared, imaging, stop, measure)
 }
 
@@ -160,8 +162,9 @@ pub(super) fn measure(
     shared: &Arc<Shared>,
     mut source: CameraSource,
     first: Connected,
+    made: Made,
 ) -> Result<(), CaptureError> {
-    let mut live = Live::new(Arc::clone(shared), &mut source).with_load();
+    let mut live = Live::new(Arc::clone(shared), &mut source).on_its_thread(made);
     let mut next = Some(first);
     // A person who starts this program can see the camera.
     let mut person_said = true;

@@ -52,6 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         frames: Some(frames as u32),
         calibration: Calibration::Kept(settling.clone()),
         record: Some(Target::New(path.clone())),
+        made: None,
     };
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(1)?)))?;
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(()))?;

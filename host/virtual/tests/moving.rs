@@ -40,6 +40,7 @@ fn taken(speed_m_per_s: f64) -> Taken {
         frames: Some(FRAMES),
         calibration: Calibration::Kept(settling),
         record: Some(Target::New(path.clone())),
+        made: None,
     };
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(1).unwrap()))).unwrap();
     let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap();

@@ -67,7 +67,13 @@ impl Link for Tapped {
 
 /// What [`talk`] asks for.
 pub fn capture_options(record: Option<Target>) -> CaptureOptions {
-    CaptureOptions { setup: setup(), frames: Some(3), calibration: Calibration::None, record }
+    CaptureOptions {
+        setup: setup(),
+        frames: Some(3),
+        calibration: Calibration::None,
+        record,
+        made: None,
+    }
 }
 
 /// The bytes of a camera during a greeting, questions about its state, and a capture of three frames.

@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, Measured};
 use nirspi::identity::CameraIdentity;
-use nirspi::recording::{Recorder, RunAccount, Target};
+use nirspi::recording::{Opening, Recorder, RunAccount, Target};
 use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
@@ -145,8 +145,8 @@ fn a_recording_that_is_there_is_not_written_over() {
 fn crafted(bench: &Bench, name: &str, setup: &MeasurementSetup, settling: &Settling) {
     let identity = CameraIdentity::current("crafted", "1");
     let target = Target::New(bench.path(name));
-    let mut recorder =
-        Recorder::create(&target, &identity, setup, Some(settling), Some(7)).unwrap();
+    let opening = Opening { settling: Some(settling), ..Opening::of(&identity, setup, 7) };
+    let mut recorder = Recorder::create(&target, &opening).unwrap();
     let (mut words, mut packet) = ([0; 8192], vec![0; MAX_DEVICE_PACKET + 1]);
     let samples =
         Samples::pack((0..1024_i32).map(|k| i64::from(5000 - k)), Width::Bits32, &mut words)

@@ -9,11 +9,12 @@
 //! file cannot be made goes on in the current file until it is stopped (`host/tests/split.rs`).
 
 use super::missing::lacking;
-use crate::recording::{Part, Recorder, RunAccount, Split, Target, name_of, part_path};
+use crate::recording::{Opening, Part, Recorder, RunAccount, Split, Target, name_of, part_path};
 use nirspi_camera::response::Settling;
 use nirspi_camera::setup::MeasurementSetup;
 use nirspi_camera::tally::Tally;
 use nirspi_files::identity::CameraIdentity;
+use nirspi_files::provenance::Provenance;
 use nirspi_wire::{DeviceMessage, PacketError};
 use std::io;
 use std::mem;
@@ -24,22 +25,29 @@ use std::time::Duration;
 
 /// What every file of a run says before its packets.
 #[derive(Debug)]
-struct Opening {
-    identity: CameraIdentity,
-    setup: MeasurementSetup,
-    settling: Option<Settling>,
-    run: Option<u16>,
+pub(super) struct Head {
+    pub(super) identity: CameraIdentity,
+    pub(super) setup: MeasurementSetup,
+    pub(super) settling: Option<Settling>,
+    /// The number of the run whose frames count.
+    pub(super) run: u16,
+    pub(super) provenance: Option<Provenance>,
 }
 
-impl Opening {
+impl Head {
     fn create(&self, target: &Target) -> io::Result<Recorder> {
-        let Self { identity, setup, settling, run } = self;
-        Recorder::create(target, identity, setup, settling.as_ref(), *run)
+        let Self { identity, setup, settling, run, provenance } = self;
+        let (settling, provenance) = (settling.as_ref(), provenance.as_ref());
+        let run = Some(*run);
+        Recorder::create(
+            target,
+            &Opening { identity, setup, settling, run, part: None, provenance },
+        )
     }
 
     /// The tally of the frames from this one on.
     fn tally(&self, first_frame: u64) -> Tally {
-        Tally::new(&self.setup, self.run).beginning_at(first_frame)
+        Tally::new(&self.setup, Some(self.run)).beginning_at(first_frame)
     }
 }
 
@@ -66,7 +74,7 @@ struct Splitting {
     split: Split,
     /// The name without the number.
     whole: PathBuf,
-    opening: Arc<Opening>,
+    head: Arc<Head>,
     /// The number of the current file.
     number: u32,
     /// The frames of the current file.
@@ -97,34 +105,22 @@ impl RunRecorder {
     ///
     /// # Errors
     /// As [`Recorder::create`].
-    pub(super) fn create(
-        target: &Target,
-        identity: &CameraIdentity,
-        setup: &MeasurementSetup,
-        settling: Option<&Settling>,
-        run: Option<u16>,
-    ) -> io::Result<Self> {
-        let mut current = Recorder::create(target, identity, setup, settling, run)?;
+    pub(super) fn create(target: &Target, head: Head) -> io::Result<Self> {
+        let mut current = head.create(target)?;
         let Some(split) = target.split() else { return Ok(Self { current, splitting: None }) };
         let first = Part { number: 1, first_frame: 0, follows: None };
         if let Err(error) = current.follow(None, &first) {
             current.discard();
             return Err(error);
         }
-        let opening = Opening {
-            identity: identity.clone(),
-            setup: setup.clone(),
-            settling: settling.cloned(),
-            run,
-        };
         let splitting = Splitting {
             split,
             whole: match target {
                 Target::Parts(whole, _) => whole.clone(),
                 _ => whole_of(current.path()),
             },
-            tally: opening.tally(0),
-            opening: Arc::new(opening),
+            tally: head.tally(0),
+            head: Arc::new(head),
             number: 1,
             is_after_frame: false,
             began_ns: current.newest_ns(),
@@ -247,9 +243,9 @@ impl Splitting {
     fn go_on(&mut self, current: &mut Recorder) -> io::Result<()> {
         match mem::replace(&mut self.next, Next::Later) {
             Next::Later if self.is_due(current) => {
-                let opening = Arc::clone(&self.opening);
+                let head = Arc::clone(&self.head);
                 let target = Target::New(part_path(&self.whole, self.number + 1));
-                let make = move || opening.create(&target);
+                let make = move || head.create(&target);
                 self.next = match thread::Builder::new().name("next file".to_owned()).spawn(make) {
                     Ok(making) => Next::Making(making),
                     Err(error) => Next::Refused(error),
@@ -316,7 +312,7 @@ impl Splitting {
         };
         let last = mem::replace(current, next);
         self.closing = Some(thread::spawn(move || last.finish(&account)));
-        self.tally = self.opening.tally(first_frame);
+        self.tally = self.head.tally(first_frame);
         (self.number, self.began_ns) = (number, current.newest_ns());
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! One run of a capture in turns, so that a caller can do other work in between.
 
-use super::files::RunRecorder;
+use super::files::{Head, RunRecorder};
 use super::frames_due::FramesDue;
 use super::junk::Junk;
 use super::{
@@ -15,6 +15,7 @@ use nirspi_camera::session::{
 use nirspi_camera::setup::MeasurementSetup;
 use nirspi_camera::tally::Tally;
 use nirspi_files::clock::Instant;
+use nirspi_files::provenance::Taken;
 use nirspi_wire::{
     Answer, DeviceMessage, Event, EventKind, Fault, PacketError, Refusal, Reply, RunLength, State,
     Status,
@@ -181,10 +182,13 @@ impl Run {
         let recorder = match &options.record {
             None => None,
             Some(target) => {
-                let (identity, settling) = (session.identity(), settling.as_ref());
-                let made = RunRecorder::create(target, identity, &setup, settling, Some(number));
+                let identity = session.identity().clone();
+                let provenance = options.made.as_ref().map(|made| Taken::by(&identity).made(made));
+                let (setup, settling) = (setup.clone(), settling.clone());
+                let head = Head { identity, setup, settling, run: number, provenance };
                 let path = || target.path().to_owned();
-                Some(made.map_err(|source| CaptureError::Recording { path: path(), source })?)
+                let recorder = RunRecorder::create(target, head);
+                Some(recorder.map_err(|source| CaptureError::Recording { path: path(), source })?)
             }
         };
         observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());

@@ -47,8 +47,17 @@ pub struct Opening<'o> {
     pub run: Option<u16>,
     /// The place of the file in a run of several files.
     pub part: Option<&'o Part>,
-    /// The provenance of an export; a recording is the readings themselves.
+    /// The camera, and the program that writes the file.
     pub provenance: Option<&'o Provenance>,
+}
+
+impl<'o> Opening<'o> {
+    /// The opening of a run in one file; nothing else is known.
+    #[must_use]
+    pub fn of(identity: &'o CameraIdentity, setup: &'o MeasurementSetup, run: u16) -> Self {
+        let (settling, part, provenance) = (None, None, None);
+        Self { identity, setup, settling, run: Some(run), part, provenance }
+    }
 }
 
 /// The records of a recording.

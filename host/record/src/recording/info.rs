@@ -5,6 +5,7 @@ use crate::recording::hear_recording;
 use nirspi_camera::account::{FailedChecks, LossCounters};
 use nirspi_files::clock::date;
 use nirspi_files::identity::CameraIdentity;
+use nirspi_files::provenance::Made;
 use nirspi_recon::words::count;
 use serde::Serialize;
 use std::fmt;
@@ -19,6 +20,8 @@ pub struct RecordingInfo {
     pub bytes: u64,
     /// The recorded camera.
     pub camera: CameraIdentity,
+    /// The program that wrote the recording, its command line and when it started; `null` if the recording does not say.
+    pub written_by: Option<Made>,
     /// Time of the first packet, as `2026-11-20 08:30 UTC`; `null` without a packet.
     pub begun: Option<String>,
     /// Duration by the camera's clock, from the first frame to the last.
@@ -82,11 +85,12 @@ impl RecordingInfo {
             span.map_or(0.0, |(first, last)| (last - first) as f64 * unit)
         };
         let end = recording.end().clone();
-        let Recording { identity, setup, settling, run, part, .. } = recording;
+        let Recording { identity, setup, settling, run, part, provenance, .. } = recording;
         Ok(Self {
             recording: path.to_owned(),
             bytes: std::fs::metadata(path).map_or(0, |file| file.len()),
             camera: identity,
+            written_by: provenance.map(|provenance| provenance.made),
             begun: times.map(|(first, _)| date(first / 1_000_000_000)),
             device_seconds: seconds(device, 1e-6),
             host_seconds: seconds(times, 1e-9),
@@ -126,6 +130,11 @@ impl fmt::Display for RecordingInfo {
         }
         let (board, serial) = (camera.board.escape_debug(), camera.serial.escape_debug());
         writeln!(f, "camera {board} {serial}, wire protocol {}", camera.protocol)?;
+        if let Some(made) = &self.written_by {
+            let Made { program, command, date, .. } = made;
+            let text = format!("written by {program}, {date}: {command}");
+            writeln!(f, "{}", text.replace(char::is_control, "?"))?;
+        }
         let pairs = match (self.differential, self.alternating) {
             (true, true) => "pairs of a pattern and its complement, by turns,",
             (true, false) => "pairs of a pattern and its complement",

@@ -9,6 +9,7 @@ use nirspi_camera::response::Settling;
 use nirspi_camera::setup::MeasurementSetup;
 use nirspi_camera::tally::Tally;
 use nirspi_files::identity::CameraIdentity;
+use nirspi_files::provenance::{KEY, Provenance};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
 use nirspi_wire::{crc32, version};
 use serde::de::DeserializeOwned;
@@ -43,6 +44,8 @@ pub struct Recording {
     pub run: Option<u16>,
     /// The place of the file in a run of several files; `None` for a run in one file.
     pub part: Option<Part>,
+    /// The program that wrote the file, if the file says so.
+    pub provenance: Option<Provenance>,
     records: Records,
     /// The first packet, which was read at the end of the header.
     first: Option<Packet>,
@@ -116,8 +119,8 @@ impl Recording {
             end = End::default();
         }
         end.account = parts.account;
-        let Parts { settling, run, part, .. } = parts;
-        Ok(Self { identity, setup, settling, run, part, records, first, end })
+        let Parts { settling, run, part, provenance, .. } = parts;
+        Ok(Self { identity, setup, settling, run, part, provenance, records, first, end })
     }
 
     /// Number of the first frame of the file in its run.
@@ -362,6 +365,7 @@ struct Parts {
     settling: Option<Settling>,
     run: Option<u16>,
     part: Option<Part>,
+    provenance: Option<Provenance>,
     account: Option<RunAccount>,
     /// Whether the identity has a checksum, and this program speaks its protocol.
     is_vouched: bool,
@@ -382,6 +386,11 @@ impl Parts {
             }),
             RUN => fill(&mut self.run, path, "run", texts, |_| Ok(())),
             PART => fill(&mut self.part, path, "part", texts, Part::check),
+            // Readings are not lost because nobody knows who recorded them.
+            KEY => {
+                Ok(fill(&mut self.provenance, path, "provenance", texts, |_| Ok(()))
+                    .unwrap_or(false))
+            }
             ACCOUNT => fill(&mut self.account, path, "account", texts, |_| Ok(())),
             _ => Ok(false),
         };
@@ -441,7 +450,7 @@ pub(super) fn checksum(json: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{Recorder, Target};
+    use crate::recording::{Opening, Recorder, Target};
     use nirspi_camera::account::LossCounters;
 
     fn identity() -> CameraIdentity {
@@ -459,7 +468,8 @@ mod tests {
 
     fn recording(path: &Path, packets: usize) {
         let target = Target::New(path.to_owned());
-        let mut recorder = Recorder::create(&target, &identity(), &setup(), None, Some(7)).unwrap();
+        let mut recorder =
+            Recorder::create(&target, &Opening::of(&identity(), &setup(), 7)).unwrap();
         for n in 0..packets {
             recorder.packet(&vec![n as u8; 5000]).unwrap();
         }

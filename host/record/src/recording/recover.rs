@@ -73,8 +73,9 @@ fn copy(path: &Path, file: impl Write, out: &Path) -> Result<Recovered, RecoverE
     let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
     let (identity, run) = (recording.identity.clone(), recording.run);
     let (identity, setup, settling) = (&identity, &setup, settling.as_ref());
-    let part = recording.part.clone();
-    let opening = Opening { identity, setup, settling, run, part: part.as_ref(), provenance: None };
+    let (part, provenance) = (recording.part.clone(), recording.provenance.clone());
+    let (part, provenance) = (part.as_ref(), provenance.as_ref());
+    let opening = Opening { identity, setup, settling, run, part, provenance };
     let mut book = Book::begin(file, &opening).map_err(write)?;
     let mut tally = hear_recording(&mut recording, |heard, tally| {
         book.packet(heard.time_ns, heard.raw)

@@ -7,10 +7,7 @@ use super::book::{Book, Opening};
 use super::file::{Place, Target};
 use super::spool::{self, Disk, Spool};
 use super::{Part, RunAccount};
-use nirspi_camera::response::Settling;
-use nirspi_camera::setup::MeasurementSetup;
 use nirspi_camera::tally::Tally;
-use nirspi_files::identity::CameraIdentity;
 use nirspi_wire::{DeviceMessage, PacketError};
 use std::fs::File;
 use std::io;
@@ -54,24 +51,16 @@ impl Clock {
 }
 
 impl Recorder {
-    /// Makes the file and writes identity and setup. `run` is the number of the run whose frames
-    /// count.
+    /// Makes the file and writes what stands before the packets.
     ///
     /// # Errors
     /// If the file exists, or cannot be made or written. A file that could not be written is
     /// removed.
-    pub fn create(
-        target: &Target,
-        identity: &CameraIdentity,
-        setup: &MeasurementSetup,
-        settling: Option<&Settling>,
-        run: Option<u16>,
-    ) -> io::Result<Self> {
+    pub fn create(target: &Target, opening: &Opening<'_>) -> io::Result<Self> {
         let (place, file) = Place::make(target)?;
         let begun = file.try_clone().and_then(|clone| {
-            let opening = Opening { identity, setup, settling, run, part: None, provenance: None };
             let (spool, disk) = spool::start(clone)?;
-            let book = Book::begin(spool, &opening)?;
+            let book = Book::begin(spool, opening)?;
             disk.settle()?;
             Ok((book, disk))
         });
@@ -178,6 +167,8 @@ impl Recorder {
 mod tests {
     use super::*;
     use crate::recording::Recording;
+    use nirspi_camera::setup::MeasurementSetup;
+    use nirspi_files::identity::CameraIdentity;
     use nirspi_recon::Order;
 
     /// The clock of the system may be set while a run is recorded.
@@ -188,7 +179,7 @@ mod tests {
         let setup = MeasurementSetup::new(&Order::Natural, 0.1).unwrap();
         let create = |name: &str| {
             let target = Target::New(folder.path().join(name));
-            Recorder::create(&target, &identity, &setup, None, Some(7)).unwrap()
+            Recorder::create(&target, &Opening::of(&identity, &setup, 7)).unwrap()
         };
         let (mut first, mut second) = (create("1.mcap"), create("2.mcap"));
         const HOUR_NS: u64 = 3_600_000_000_000;

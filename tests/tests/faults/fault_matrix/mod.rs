@@ -179,6 +179,7 @@ fn measure(
         frames: Some(frames),
         calibration: Calibration::None,
         record,
+        made: None,
     };
     capture(session, &options, &mut |_| ControlFlow::Continue(()))
 }
