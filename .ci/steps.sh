@@ -161,7 +161,9 @@ emulated_firmware() {
     export NIRSPI_FIRMWARE_ELF
 }
 
-step_test() { cargo test --locked; }
+step_test() {
+    cargo test --locked
+}
 
 step_defaults() { cargo test --locked --lib --test defaults -- --ignored; }
 
