@@ -2,6 +2,7 @@
 
 use crate::arrays::array;
 use crate::errors::of_file;
+use crate::made::said;
 use crate::measurement::word;
 use crate::work::heavy;
 use nirspi::files::trace::{Cut, read};
@@ -31,16 +32,18 @@ impl Options {
     }
 }
 
-/// The readings of a trace; what was found, what is not to be trusted, and what was left out, in words.
+/// The readings of a trace; what was found, what is not to be trusted, and what was left out, in words; where the readings
+/// come from, as JSON.
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "a tuple is what Python takes apart")]
 pub fn trace<'py>(
     py: Python<'py>,
     path: PathBuf,
     options: Options,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<String>, Vec<String>, Option<String>)> {
+) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<String>, Vec<String>, Option<String>, String)> {
     let cut = options.checked()?;
     let found = heavy(py, || read(&path, &cut).map_err(of_file))?;
     let (words, warnings) = (found.words(), found.warnings());
-    Ok((array(py, found.readings), words, warnings, found.skipped))
+    let taken = said(&found.taken)?;
+    Ok((array(py, found.readings), words, warnings, found.skipped, taken))
 }

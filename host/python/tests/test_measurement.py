@@ -132,6 +132,8 @@ def test_a_trace_is_the_measurement_of_its_readings(tmp_path):
     m = ns.Measurement.from_trace(tmp_path / "scope.npz", trigger="TRIG", settle=2, rows="zig-zag", n=N)
     assert np.allclose(m.d, of(scene), atol=1e-9)
     assert "512 readings by the trigger" in m.notes[0]
+    assert m.origin["file"] == "scope.npz" and m.origin["origin"].startswith("unknown")
+    assert b'"file":"scope.npz"' in ns.reconstruct(m, method="hadamard").png()
     # An edge that is not there is a pattern that was not read.
     trigger[5 + 6 * 8 : 8 + 6 * 8] = 0.0
     np.savez(tmp_path / "scope.npz", CH1=samples, TRIG=trigger)

@@ -7,13 +7,12 @@ import json
 import os
 import tempfile
 import warnings
-import zipfile
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from . import _arrays, _nirspi
+from . import _arrays, _nirspi, _table
 from ._nirspi import Error
 from .hadamard import order
 
@@ -285,8 +284,9 @@ class Measurement:
         """
         if samples is None and trigger is None:
             raise Error("a trace without samples and trigger, expected one of them")
-        y, words = _trace(path, samples, trigger, field, skip, settle, count, raw, decimal_comma)
+        y, words, origin = _trace(path, samples, trigger, field, skip, settle, count, raw, decimal_comma)
         made = cls(y=y, rows=rows, n=n, readings=readings, transpose=transpose)
+        made.origin = origin
         made.notes = [*words, *made.notes]
         return made
 
@@ -315,7 +315,7 @@ class Measurement:
         >>> bool(np.allclose(m.d, ns.Hadamard(8)(scene)))
         True
         """
-        return _of_columns(_columns(table), "the table", source)
+        return _of_columns(_table.columns_of(table), "the table", source, None)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes an ``.npz`` that :func:`load` and ``nirspi reconstruct`` read.
@@ -381,8 +381,11 @@ def _trace(
     count: int | None,
     raw: str | None,
     decimal_comma: bool,
-) -> tuple[np.ndarray, list[str]]:
-    """The readings of a trace, and what was found, in words. Doubts are warnings of the caller's caller."""
+) -> tuple[np.ndarray, list[str], dict[str, Any]]:
+    """The readings of a trace, what was found, in words, and their origin.
+
+    Doubts are warnings of the caller's caller.
+    """
     options = {
         "samples": _arrays.count(samples, "samples", least=1),
         "trigger": trigger,
@@ -393,44 +396,15 @@ def _trace(
         "raw": raw,
         "decimal_comma": bool(decimal_comma),
     }
-    y, words, doubts, skipped = _nirspi.trace(os.fspath(path), options)
+    y, words, doubts, skipped, taken = _nirspi.trace(os.fspath(path), options)
     for doubt in doubts:
         warnings.warn(doubt, RuntimeWarning, stacklevel=3)
-    return y, [*words, *([skipped] if skipped else [])]
+    return y, [*words, *([skipped] if skipped else [])], json.loads(taken)
 
 
-def _columns(table: Any) -> dict[str, np.ndarray]:
-    """The columns of numbers of a table."""
-    names = getattr(getattr(table, "dtype", None), "names", None)
-    if names is None:
-        names = getattr(table, "columns", None)
-    if names is None and hasattr(table, "keys"):
-        names = table.keys()
-    if names is None:
-        raise Error(f"table is {type(table).__name__}, expected columns by their names")
-    found: dict[str, np.ndarray] = {}
-    for name in names:
-        column = table[name]
-        if hasattr(column, "to_numpy") and str(getattr(column, "dtype", "")) in _NULLABLE:
-            column = column.to_numpy(dtype=np.float64, na_value=np.nan)
-        values = _arrays.array_of(column, f"column {name!r}")
-        if values.dtype.kind == "O":
-            try:
-                values = values.astype(np.float64)
-            except (TypeError, ValueError):
-                continue
-        if values.dtype.kind in "biufc":
-            found[str(name)] = values
-    return found
-
-
-# Types of pandas that have a value for "missing".
-_NULLABLE = frozenset(
-    ["Float32", "Float64", *(f"{kind}{bits}" for kind in ("Int", "UInt") for bits in (8, 16, 32, 64))]
-)
-
-
-def _of_columns(columns: dict[str, np.ndarray], name: str, source: dict[str, Any]) -> Measurement:
+def _of_columns(
+    columns: dict[str, np.ndarray], name: str, source: dict[str, Any], origin: dict[str, Any] | None
+) -> Measurement:
     """The measurement of columns in memory, by the reader of files."""
     options = source_options(**source)
     renamed = [part.split("=", 1) for part in (source.get("field") or "").split(",") if "=" in part]
@@ -440,14 +414,10 @@ def _of_columns(columns: dict[str, np.ndarray], name: str, source: dict[str, Any
         if columns[own].size > 1 and (columns[own] == columns[own].flat[0]).all():
             columns[own] = columns[own].reshape(-1)[0]
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "table.npz")
-        with zipfile.ZipFile(path, "w") as archive:
-            for column, values in columns.items():
-                with archive.open(f"{column}.npy", "w", force_zip64=True) as member:
-                    np.lib.format.write_array(member, np.asanyarray(values), allow_pickle=False)
+        path = _table.write(columns, folder)
         try:
             made = _of_loaded(_nirspi.load(path, options))
-            made.origin = None
+            made.origin = origin
             return made
         except Error as error:
             raise Error(str(error).replace(path, name)) from None
@@ -644,8 +614,8 @@ def read(
             raise Error(f"{given[0]} without samples and trigger, expected one of them: it is of a trace")
         return load(path, **source)
     field, comma = source.pop("field", None), source.pop("decimal_comma", False)
-    y, words = _trace(path, samples, trigger, field, skip, settle, count, raw, comma)
-    made = _of_columns({"y": y}, os.fspath(path), source)
+    y, words, origin = _trace(path, samples, trigger, field, skip, settle, count, raw, comma)
+    made = _of_columns({"y": y}, os.fspath(path), source, origin)
     made.notes = [*words, *made.notes]
     return made
 
