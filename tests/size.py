@@ -3,8 +3,8 @@
 usage: python3 tests/size.py
 
 Lines are lines of Rust in files that git knows. Those without tests leave out folders and files named `tests` or `testing`,
-and what stands behind `#[cfg(test)] mod tests {`. A locked crate is a name in a Cargo.lock. That no two modules and no two
-crates use each other is a test: tests/tests/dependencies.rs.
+the files of every module behind `#[cfg(test)]`, and what stands behind `#[cfg(test)] mod tests {`. A locked crate is a name
+in a Cargo.lock. That no two modules and no two crates use each other is a test: tests/tests/dependencies.rs.
 """
 import pathlib
 import re
@@ -12,6 +12,7 @@ import subprocess
 import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+TEST_MODULE = re.compile(r"#\[cfg\(test\)\]\n(?:pub(?:\(.*\))? )?mod (\w+);")
 TESTS = re.compile(r"\n#\[cfg\(test\)\]\n(?:pub\(crate\) )?mod tests \{")
 
 
@@ -22,14 +23,23 @@ def tracked(*patterns: str) -> list[pathlib.Path]:
     return [ROOT / name for name in names if name]
 
 
-def is_test(file: pathlib.Path) -> bool:
-    """Whether a file of a crate holds tests alone, or what they share."""
-    return bool({"tests", "testing"} & set(file.with_suffix("").parts))
+def test_modules(file: pathlib.Path) -> set[pathlib.Path]:
+    """The modules of a file that are compiled for tests alone: each one's file without `.rs`, or its folder."""
+    folder = file.parent if file.stem in ("lib", "main", "mod") else file.with_suffix("")
+    return {folder / name for name in TEST_MODULE.findall(file.read_text())}
 
 
 def lines_without_tests(crate: pathlib.Path) -> int:
     """Lines of a crate's sources."""
-    files = [file for file in tracked(f"{crate}/src/*.rs") if not is_test(file.relative_to(ROOT / crate))]
+    files = tracked(f"{crate}/src/*.rs")
+    tests = set().union(*map(test_modules, files))
+
+    def is_test(file: pathlib.Path) -> bool:
+        path = file.with_suffix("")
+        named = {"tests", "testing"} & set(path.relative_to(ROOT / crate).parts)
+        return bool(named) or not tests.isdisjoint({path, *path.parents})
+
+    files = [file for file in files if not is_test(file)]
     return sum(TESTS.split(file.read_text())[0].count("\n") for file in files)
 
 
