@@ -28,7 +28,7 @@ steps=(
 )
 
 # Steps that check files that seldom change, each for minutes. A run of every step has those whose files changed in the
-# last day, and one more: another for another commit. GitHub runs all of them.
+# last five hours, so that new commits are checked, and one more: another for another commit. GitHub runs all of them.
 turns=(
     "defaults        the default method beside every other one, and videos beside their frames, in tests that take long"
     "gpu             OMP's GPU kernels on software Vulkan; Debian"
@@ -55,7 +55,7 @@ turn_files() {
 turn_changed() {
     local files
     read -ra files < <(turn_files "$1")
-    [ ${#files[@]} != 0 ] && [ -n "$(git log -1 --since=1.day --format=%h -- "${files[@]}")" ]
+    [ ${#files[@]} != 0 ] && [ -n "$(git log -1 --since=5.hours --format=%h -- "${files[@]}")" ]
 }
 # The names of the steps of `turns` whose turn it is: `due`; of the others: `due not`.
 due() {
