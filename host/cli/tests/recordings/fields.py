@@ -40,7 +40,9 @@ def recording(path, frames):
         # What stands before the packets stands once more at the end.
         assert texts.setdefault(record.name, text) == text, record.name
     parts = {name.removeprefix("nirspi."): json.loads(text) for name, text in texts.items()}
-    assert set(parts) == {"identity", "setup", "settling", "run", "account"}, parts.keys()
+    assert set(parts) == {"identity", "setup", "settling", "run", "nirspi-provenance", "account"}, parts.keys()
+    provenance = parts["nirspi-provenance"]
+    assert provenance["origin"] == "simulated" and " capture " in provenance["command"], provenance
     identity, account = parts["identity"], parts["account"]
     assert (identity["board"], identity["serial"], identity["protocol"]) == ("virtual", "virtual-1", 1), identity
     assert (identity["adc_hz"], identity["adc_bits"], identity["wavelength_nm"]) == (125_000_000, 14, 1550), identity
