@@ -28,7 +28,8 @@ steps=(
 )
 
 # Steps that check files that seldom change, each for minutes. A run of every step has those whose files changed in the
-# last five hours, so that new commits are checked, and one more: another for another commit. GitHub runs all of them.
+# last hours, so that new commits are checked, and one more: another for another commit. GitHub runs all of them.
+turn_hours=5
 turns=(
     "defaults        the default method beside every other one, and videos beside their frames, in tests that take long"
     "gpu             OMP's GPU kernels on software Vulkan; Debian"
@@ -40,12 +41,13 @@ turns=(
     "electronics     circuits beside the simulator's constants, the LED tile's netlist; Debian's ngspice, PyPI"
     "place-route     place and route of the gateware and of the bring-up design, one seed each; PyPI"
 )
-# A step without files, because every change of Rust code would be one of its files, has its turn alone.
+# The files that a step checks. `defaults` and `features` check so much of the Rust code that they would run at every
+# commit: they have no files here, and run only when it is their turn.
 turn_files() {
     case $1 in
         gpu) echo host/gpu/src host/omp/src ;;
-        mie) echo host/optics/src/mie.rs host/optics/scripts ;;
-        rtl-long) echo hdl/rtl hdl/boards ;;
+        mie) echo host/optics/src/mie.rs host/optics/examples host/optics/scripts ;;
+        rtl-long) echo hdl/rtl hdl/boards host/camera/src/selftest ;;
         verilator) echo hdl/sv hdl/verilator ;;
         proofs) echo hdl/rtl hdl/formal ;;
         electronics) echo boards/electronics host/optics/cameras ;;
@@ -55,7 +57,7 @@ turn_files() {
 turn_changed() {
     local files
     read -ra files < <(turn_files "$1")
-    [ ${#files[@]} != 0 ] && [ -n "$(git log -1 --since=5.hours --format=%h -- "${files[@]}")" ]
+    [ ${#files[@]} != 0 ] && [ -n "$(git log -1 --since="$turn_hours.hours" --format=%h -- "${files[@]}")" ]
 }
 # The names of the steps of `turns` whose turn it is: `due`; of the others: `due not`.
 due() {
@@ -176,7 +178,8 @@ step_gpu() {
 step_gpu_program() {
     software_vulkan
     gpu_tests -p nirspi-gpu -p nirspi-recon --features nirspi-gpu/wgpu,nirspi-recon/gpu --lib -- omp::
-    gpu_tests -p nirspi-gpu -p nirspi-nets --features nirspi-gpu/wgpu,nirspi-nets/gpu --lib -- gpu:: networks:: agreement:: weights:: enhance::device
+    gpu_tests -p nirspi-gpu -p nirspi-nets --features nirspi-gpu/wgpu,nirspi-nets/gpu --lib -- \
+        gpu:: networks:: agreement:: weights:: enhance::device
     gpu_tests -p nirspi-eval -p nirspi-cli --features nirspi-cli/wgpu --lib --test cli -- \
         omp:: gpu:: sparse_problems:: a_gpu_enhances the_whole_of_the_pipeline
 }

@@ -386,7 +386,7 @@ impl Parts {
             }),
             RUN => fill(&mut self.run, path, "run", texts, |_| Ok(())),
             PART => fill(&mut self.part, path, "part", texts, Part::check),
-            // Readings are not lost because nobody knows who recorded them.
+            // A recording whose provenance is damaged is read all the same.
             KEY => {
                 Ok(fill(&mut self.provenance, path, "provenance", texts, |_| Ok(()))
                     .unwrap_or(false))
