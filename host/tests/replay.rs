@@ -3,8 +3,9 @@
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi::address::CameraAddress;
-use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Record, StopCause, capture};
 use nirspi::identity::CameraIdentity;
+use nirspi::provenance::Made;
 use nirspi::recording::{Opening, Recorder, Recording, RunAccount, Target, tally_recording};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
@@ -92,8 +93,10 @@ fn replay(path: &Path, speed: &str, frames: Option<u32>, record: Option<&Path>) 
         setup: MeasurementSetup::new(&Order::Natural, 1.0).unwrap(),
         frames,
         calibration: Calibration::Measure,
-        record: record.map(|path| Target::New(path.to_owned())),
-        made: None,
+        record: record.map(|path| Record {
+            target: Target::New(path.to_owned()),
+            made: Made::by("a test", None, ["a test"], 0),
+        }),
     };
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
@@ -198,7 +201,6 @@ fn a_replay_that_is_stopped_loses_no_frame() {
         frames: None,
         calibration: Calibration::None,
         record: None,
-        made: None,
     };
     let captured =
         capture(&mut session, &options, &mut |progress| match progress.counters.received {

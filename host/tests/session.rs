@@ -2,8 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::capture::{Calibration, Capture, CaptureError, CaptureOptions, capture};
+use nirspi::capture::{Calibration, Capture, CaptureError, CaptureOptions, Record, capture};
 use nirspi::link::{Link, Received};
+use nirspi::provenance::Made;
 use nirspi::recording::Target;
 use nirspi::replay::ReplayLink;
 use nirspi::session::{IgnorePackets, Session, SessionError, request};
@@ -181,8 +182,8 @@ fn capture_of(
         setup: MeasurementSetup::new(&Order::Natural, 0.001).unwrap(),
         frames: Some(frames),
         calibration: Calibration::None,
-        record,
-        made: None,
+        record: record
+            .map(|target| Record { target, made: Made::by("a test", None, ["a test"], 0) }),
     };
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(()))
 }

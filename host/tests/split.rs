@@ -5,8 +5,8 @@
 use nirspi::account::LossCounters;
 use nirspi::address::CameraAddress;
 use nirspi::capture::{
-    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
-    observe,
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, Record,
+    StopCause, observe,
 };
 use nirspi::identity::CameraIdentity;
 use nirspi::provenance::Made;
@@ -127,8 +127,7 @@ fn capture_of(
         setup,
         frames,
         calibration: Calibration::None,
-        record,
-        made: Some(made()),
+        record: record.map(|target| Record { target, made: made() }),
     };
     observe(&mut session, &options, &mut disturbing)
 }

@@ -8,7 +8,7 @@
 //! counters must be those of the injector's own log. Prints a line a session, writes FOLDER/soak.csv and, on Linux, the
 //! memory as FOLDER/memory.png. Exit code 1 at the first frame that is not accounted for.
 
-use nirspi::capture::{Calibration, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, CaptureOptions, Ended, Record, capture};
 use nirspi::picture::{Axis, Chart, Figure, FigureStyle, Line};
 use nirspi::provenance::{Made, Origin, Taken};
 use nirspi::recording::Target;
@@ -127,8 +127,10 @@ fn session(
         setup: MeasurementSetup::new(&Order::Sequency, 1.0)?,
         frames: Some(SESSION),
         calibration: Calibration::None,
-        record: Some(Target::New(recording.clone())),
-        made: None,
+        record: Some(Record {
+            target: Target::New(recording.clone()),
+            made: Made::by("a test", None, ["a test"], 0),
+        }),
     };
     let captured =
         capture(&mut Session::open(Box::new(link))?, &options, &mut |_| ControlFlow::Continue(()))?;

@@ -120,7 +120,6 @@ pub fn measure(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> 
         frames: Some(frames),
         calibration: Calibration::None,
         record: None,
-        made: None,
     };
     capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }

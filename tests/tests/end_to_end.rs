@@ -3,9 +3,10 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
-use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, StopCause, capture};
+use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Record, StopCause, capture};
 use nirspi::integrate::Integrated;
 use nirspi::link::Link;
+use nirspi::provenance::Made;
 use nirspi::recording::{Recording, RecordingError, Target, hear_recording, tally_recording};
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
@@ -48,10 +49,14 @@ fn optics() -> VirtualOptics {
     VirtualOptics::new(scene(), 300.0).unwrap()
 }
 
+fn recorded_to(path: &Path) -> Record {
+    Record { target: Target::New(path.to_owned()), made: Made::by("a test", None, ["a test"], 0) }
+}
+
 fn options(order: &Order, calibrate: bool) -> CaptureOptions {
     let setup = MeasurementSetup::new(order, 1.0).unwrap();
     let calibration = if calibrate { Calibration::Measure } else { Calibration::None };
-    CaptureOptions { setup, frames: Some(FRAMES), calibration, record: None, made: None }
+    CaptureOptions { setup, frames: Some(FRAMES), calibration, record: None }
 }
 
 fn run(link: Box<dyn Link>, options: &CaptureOptions) -> Capture {
@@ -120,7 +125,7 @@ fn a_capture_whose_samples_can_leave_24_bits_has_samples_of_32() {
         let mut options = options(&Order::CakeCutting, false);
         options.setup = MeasurementSetup::new(&Order::CakeCutting, 0.02).unwrap();
         options.setup.sweeps = sweeps;
-        options.record = Some(Target::New(path.clone()));
+        options.record = Some(recorded_to(&path));
         assert!(run(ideal_link(), &options).counters.is_complete());
         assert_eq!(widths(&path), [expected; FRAMES as usize]);
     }
@@ -233,10 +238,8 @@ fn calibration_finds_latency_and_leak_and_undoing_them_helps() {
 fn a_recording_gives_the_same_tally_as_the_capture_that_made_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
-    let options = CaptureOptions {
-        record: Some(Target::New(path.clone())),
-        ..options(&Order::CakeCutting, false)
-    };
+    let options =
+        CaptureOptions { record: Some(recorded_to(&path)), ..options(&Order::CakeCutting, false) };
     let judge = only_frames(|frame| match frame {
         1 => Fate::Drop,
         2 => Fate::Delay,
@@ -273,8 +276,7 @@ fn a_frame_of_one_sweep_is_corrected_by_what_its_run_tells() {
         setup: optics.setup(&Order::ZigZag, 1.0).unwrap(),
         frames: Some(32),
         calibration: Calibration::Kept(settling),
-        record: Some(Target::New(path.clone())),
-        made: None,
+        record: Some(recorded_to(&path)),
     };
     run(Box::new(MemoryLink::new(optics.camera(1).unwrap())), &options);
     let mut recording = Recording::open(&path).unwrap();
@@ -344,7 +346,7 @@ fn the_same_seed_gives_the_same_bytes() {
     let record = |name: &str, seed| {
         let path = folder.path().join(name);
         let options = CaptureOptions {
-            record: Some(Target::New(path.clone())),
+            record: Some(recorded_to(&path)),
             ..options(&Order::CakeCutting, true)
         };
         run(Box::new(MemoryLink::new(optics().camera(seed).unwrap())), &options);

@@ -6,13 +6,14 @@
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
 use nirspi::calibration::KeptCalibration;
-use nirspi::capture::{Calibration, CaptureOptions, capture};
+use nirspi::capture::{Calibration, CaptureOptions, Record, capture};
 use nirspi::files::measurement::{self, Selection};
 use nirspi::files::table::Table;
 use nirspi::files::{image, npy};
 use nirspi::identity::CameraIdentity;
 use nirspi::order_table::read_order_table;
 use nirspi::problem;
+use nirspi::provenance::Made;
 use nirspi::recording::{Recording, Target, tally_recording};
 use nirspi::response::Settling;
 use nirspi::session::Session;
@@ -134,8 +135,10 @@ fn recording() -> Vec<u8> {
         setup: setup(),
         frames: Some(4),
         calibration: Calibration::None,
-        record: Some(Target::New(path.clone())),
-        made: None,
+        record: Some(Record {
+            target: Target::New(path.clone()),
+            made: Made::by("a test", None, ["a test"], 0),
+        }),
     };
     capture(&mut session(), &options, &mut |_| ControlFlow::Continue(())).unwrap();
     std::fs::read(path).unwrap()
@@ -293,6 +296,6 @@ fn requests_of_the_tunnel() {
 
 /// A provenance for files of tests.
 fn provenance() -> nirspi::provenance::Provenance {
-    use nirspi::provenance::{Made, Origin, Taken};
+    use nirspi::provenance::{Origin, Taken};
     Taken::without_camera(Origin::Simulated).made(&Made::by("test", None, ["test"], 0))
 }

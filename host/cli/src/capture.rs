@@ -6,7 +6,7 @@ use super::report::{FigureArgs, ReportArgs};
 use super::{Usage, address, print, progress, provenance};
 use anyhow::Result;
 use nirspi::capture::{
-    CaptureOptions, CaptureReport, Origin, Preview, Progress, Seconds, StopCause, observe,
+    CaptureOptions, CaptureReport, Origin, Preview, Progress, Record, Seconds, StopCause, observe,
 };
 use nirspi::exposure::Light;
 use nirspi::files::interrupt;
@@ -114,8 +114,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         setup,
         frames,
         calibration: choice.calibration.clone(),
-        record: Some(target),
-        made: Some(provenance::made().clone()),
+        record: Some(Record { target, made: provenance::made().clone() }),
     };
     let bar = progress::Progress::new("capture", frames.map(u64::from), "frames");
     let mut seen = String::new();

@@ -15,7 +15,7 @@ use crate::made::{made, said};
 use crate::work::long;
 use nirspi::address::CameraAddress;
 use nirspi::capture::CalibrationPolicy;
-use nirspi::capture::{Calibration, CaptureError, CaptureOptions};
+use nirspi::capture::{Calibration, CaptureError, CaptureOptions, Record};
 use nirspi::causes::in_one_line;
 use nirspi::frame_time::HostClock;
 use nirspi::link::Link;
@@ -333,12 +333,12 @@ impl Camera {
                 choice.calibration
             }
         };
-        let record = wanted.record.as_ref().map(|path| match wanted.overwrite {
+        let target = wanted.record.as_ref().map(|path| match wanted.overwrite {
             true => Target::Replace(path.clone()),
             false => Target::New(path.clone()),
         });
-        let (frames, made) = (wanted.frames, Some(made));
-        Ok((CaptureOptions { setup, frames, calibration, record, made }, flat))
+        let (frames, record) = (wanted.frames, target.map(|target| Record { target, made }));
+        Ok((CaptureOptions { setup, frames, calibration, record }, flat))
     }
 }
 

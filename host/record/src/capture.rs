@@ -18,7 +18,6 @@ mod frames_due;
 mod junk;
 mod missing;
 mod policy;
-#[cfg(feature = "pictures")]
 mod preview;
 mod report;
 mod run;
@@ -28,7 +27,6 @@ mod seconds;
 pub use feed::{FeedProgress, FeedReport, record_feed};
 pub use flat_field::{FlatFieldError, measure_dark, measure_flat_field};
 pub use policy::{CalibrationPolicy, Choice, Origin, PolicyError};
-#[cfg(feature = "pictures")]
 pub use preview::Preview;
 pub use report::CaptureReport;
 pub use run::Run;
@@ -62,10 +60,17 @@ pub struct CaptureOptions {
     pub frames: Option<u32>,
     /// The source of latency and settling.
     pub calibration: Calibration,
-    /// The target of a recording.
-    pub record: Option<Target>,
-    /// The program, for the provenance in a recording. Without it, the recording does not say who wrote it.
-    pub made: Option<Made>,
+    /// The recording of the capture, if there is one.
+    pub record: Option<Record>,
+}
+
+/// A recording to make.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// Where it is written.
+    pub target: Target,
+    /// The program that writes it.
+    pub made: Made,
 }
 
 /// The source of a capture's latency and settling.

@@ -15,7 +15,8 @@ use super::{ForeignError, Shared, lock};
 use nirspi::account::{FailedChecks, LossCounters};
 use nirspi::calibration::{CalibrationError, FlatField, KeptFlatField};
 use nirspi::capture::{
-    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, Record,
+    StopCause,
 };
 use nirspi::clock::Instant;
 use nirspi::events::{self, Level};
@@ -391,8 +392,9 @@ impl Live {
             }
             (calibration, _) => calibration.clone(),
         };
-        let (record, made) = (folder.map(Target::FirstFree), self.made.clone());
-        CaptureOptions { setup, frames: None, calibration, record, made }
+        let target = folder.map(Target::FirstFree);
+        let record = target.zip(self.made.clone()).map(|(target, made)| Record { target, made });
+        CaptureOptions { setup, frames: None, calibration, record }
     }
 
     /// Records the end of a run. `None` if the run was stopped from here. Fails only if the run is

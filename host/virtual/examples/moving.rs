@@ -4,8 +4,9 @@
 //! `cargo run --release -p nirspi-virtual --example moving [SPEED_M_PER_S [SWEEPS [SHARE]]]`. A picture counts while the letter
 //! is whole in the field. PSNR is against what the LEDs see in the middle of the frame, in shares of a white sheet.
 
-use nirspi::capture::{Calibration, CaptureOptions, capture};
+use nirspi::capture::{Calibration, CaptureOptions, Record, capture};
 use nirspi::integrate::Integrated;
+use nirspi::provenance::Made;
 use nirspi::recording::{Recording, RecordingError, Target, hear_recording};
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
@@ -51,8 +52,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         setup: setup.clone(),
         frames: Some(frames as u32),
         calibration: Calibration::Kept(settling.clone()),
-        record: Some(Target::New(path.clone())),
-        made: None,
+        record: Some(Record {
+            target: Target::New(path.clone()),
+            made: Made::by("moving", None, ["moving"], 0),
+        }),
     };
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(1)?)))?;
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(()))?;

@@ -166,8 +166,7 @@ pub fn shoot(
         // Single patterns need the dark level in front of this scene.
         Calibration::MeasureOr(settling.clone())
     };
-    let options =
-        CaptureOptions { setup, frames: Some(frames), calibration, record: None, made: None };
+    let options = CaptureOptions { setup, frames: Some(frames), calibration, record: None };
     let capture = capture(&mut session, &options, watch)?;
     let missing = capture.missing();
     match capture.ended {

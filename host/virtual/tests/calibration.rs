@@ -39,8 +39,7 @@ fn a_dark_scene_uses_the_kept_latency_or_fails() {
         let link = MemoryLink::new(optics.camera(1).unwrap());
         let mut session = Session::open(Box::new(link)).unwrap();
         let setup = setup.clone();
-        let options =
-            CaptureOptions { setup, frames: Some(2), calibration, record: None, made: None };
+        let options = CaptureOptions { setup, frames: Some(2), calibration, record: None };
         capture(&mut session, &options, &mut |_| ControlFlow::Continue(()))
     };
     let error = with(Calibration::Measure).unwrap_err();

@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi::capture::{Calibration, CaptureOptions, capture};
+use nirspi::capture::{Calibration, CaptureOptions, Record, capture};
+use nirspi::provenance::Made;
 use nirspi::recording::{Recording, RecordingError, Target, hear_recording};
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
@@ -39,8 +40,10 @@ fn taken(speed_m_per_s: f64) -> Taken {
         setup,
         frames: Some(FRAMES),
         calibration: Calibration::Kept(settling),
-        record: Some(Target::New(path.clone())),
-        made: None,
+        record: Some(Record {
+            target: Target::New(path.clone()),
+            made: Made::by("a test", None, ["a test"], 0),
+        }),
     };
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(1).unwrap()))).unwrap();
     let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap();

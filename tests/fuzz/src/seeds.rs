@@ -1,7 +1,8 @@
 //! What several laws begin with: the virtual camera, its answers and its recordings, made by the
 //! program's own writers.
 
-use nirspi::capture::{Calibration, CaptureOptions, capture};
+use nirspi::provenance::Made;
+use nirspi::capture::{Calibration, CaptureOptions, Record, capture};
 use nirspi::identity::CameraIdentity;
 use nirspi::info::info;
 use nirspi::link::{Link, Received};
@@ -71,8 +72,7 @@ pub fn capture_options(record: Option<Target>) -> CaptureOptions {
         setup: setup(),
         frames: Some(3),
         calibration: Calibration::None,
-        record,
-        made: None,
+        record: record.map(|target| Record { target, made: Made::by("a test", None, ["a test"], 0) }),
     }
 }
 

@@ -74,7 +74,6 @@ impl Camera<'_> {
             frames: Some(sweeps),
             calibration: Calibration::Kept(self.settling.clone()),
             record: None,
-            made: None,
         };
         let captured = capture(self.session, &options, self.watch)?;
         if !matches!(captured.ended, Ended::Complete) || !captured.counters.is_complete() {

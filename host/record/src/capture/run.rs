@@ -4,7 +4,8 @@ use super::files::{Head, RunRecorder};
 use super::frames_due::FramesDue;
 use super::junk::Junk;
 use super::{
-    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, StopCause,
+    Calibration, Capture, CaptureError, CaptureOptions, Ended, Observer, Progress, Record,
+    StopCause,
 };
 use crate::recording::{Recording, RunAccount, tally_recording};
 use nirspi_camera::calibration::{CalibrationError, calibrate, calibrate_or};
@@ -181,9 +182,9 @@ impl Run {
         let number = before.run.wrapping_add(1);
         let recorder = match &options.record {
             None => None,
-            Some(target) => {
+            Some(Record { target, made }) => {
                 let identity = session.identity().clone();
-                let provenance = options.made.as_ref().map(|made| Taken::by(&identity).made(made));
+                let provenance = Some(Taken::by(&identity).made(made));
                 let (setup, settling) = (setup.clone(), settling.clone());
                 let head = Head { identity, setup, settling, run: number, provenance };
                 let path = || target.path().to_owned();

@@ -492,6 +492,16 @@ mod tests {
     }
 
     #[test]
+    fn damaged_provenance_is_left_out_and_no_other_damage_is() {
+        let damaged = BTreeMap::from([(JSON.to_owned(), "{".to_owned())]);
+        let mut parts = Parts::default();
+        parts.keep(Path::new("a.mcap"), KEY, &damaged);
+        assert!(parts.provenance.is_none() && parts.problem.is_none());
+        parts.keep(Path::new("a.mcap"), RUN, &damaged);
+        assert!(parts.problem.is_some());
+    }
+
+    #[test]
     fn a_recording_cut_anywhere_gives_what_is_before_the_cut_or_says_what_is_missing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mcap");

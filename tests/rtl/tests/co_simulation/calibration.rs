@@ -11,13 +11,8 @@ use std::ops::ControlFlow;
 /// One frame of an instrument that has measured its own latency and leak.
 fn calibrated(mut session: Session) -> Capture {
     let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
-    let options = CaptureOptions {
-        setup,
-        frames: Some(1),
-        calibration: Calibration::Measure,
-        record: None,
-        made: None,
-    };
+    let options =
+        CaptureOptions { setup, frames: Some(1), calibration: Calibration::Measure, record: None };
     let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap();
     assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
     captured

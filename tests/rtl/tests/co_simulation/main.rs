@@ -60,8 +60,7 @@ fn session<F: SimulatedFpga + 'static>(optics: &VirtualOptics, fpga: F) -> Sessi
 fn run(session: &mut Session, setup: &MeasurementSetup, frames: u32) -> Capture {
     let setup = setup.clone();
     let calibration = Calibration::None;
-    let options =
-        CaptureOptions { setup, frames: Some(frames), calibration, record: None, made: None };
+    let options = CaptureOptions { setup, frames: Some(frames), calibration, record: None };
     capture(session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
 }
 
@@ -258,7 +257,7 @@ fn an_open_interlock_keeps_the_rtl_dark_and_the_host_is_told() {
     let mut session = Session::open(Box::new(MemoryLink::new(camera))).unwrap();
     let setup = MeasurementSetup::new(&Order::Natural, 1.0).unwrap();
     let calibration = Calibration::None;
-    let options = CaptureOptions { setup, frames: Some(1), calibration, record: None, made: None };
+    let options = CaptureOptions { setup, frames: Some(1), calibration, record: None };
     match capture(&mut session, &options, &mut |_| ControlFlow::Continue(())) {
         Ok(captured) => assert!(matches!(captured.ended, Ended::Fault(Fault::Interlock))),
         Err(error) => assert!(error.to_string().contains("interlock is open"), "{error}"),

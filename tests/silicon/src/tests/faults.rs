@@ -20,7 +20,6 @@ fn seen(mutation: fn(u32, u32) -> Option<u32>) -> Option<String> {
             frames: Some(2),
             calibration: Calibration::None,
             record: None,
-            made: None,
         };
         match capture(&mut session, &options, &mut |_| ControlFlow::Continue(())) {
             Ok(captured) if captured.counters.is_complete() => {}
@@ -121,7 +120,6 @@ fn a_list_of_the_dma_that_leads_astray_is_seen() {
         frames: Some(50),
         calibration: Calibration::None,
         record: None,
-        made: None,
     };
     let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(()));
     let counters = captured.map(|captured| captured.counters);

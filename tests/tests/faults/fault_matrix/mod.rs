@@ -2,8 +2,9 @@
 
 mod places;
 
-use nirspi::capture::{Calibration, Capture, CaptureError, CaptureOptions, Ended, capture};
+use nirspi::capture::{Calibration, Capture, CaptureError, CaptureOptions, Ended, Record, capture};
 use nirspi::link::Link;
+use nirspi::provenance::Made;
 use nirspi::recording::Target;
 use nirspi::session::{IgnorePackets, Session, SessionError, request};
 use nirspi::setup::MeasurementSetup;
@@ -178,8 +179,8 @@ fn measure(
         setup: setup(),
         frames: Some(frames),
         calibration: Calibration::None,
-        record,
-        made: None,
+        record: record
+            .map(|target| Record { target, made: Made::by("a test", None, ["a test"], 0) }),
     };
     capture(session, &options, &mut |_| ControlFlow::Continue(()))
 }

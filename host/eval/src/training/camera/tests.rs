@@ -24,7 +24,6 @@ fn captured(scene: &[f32], conditions: Conditions, seed: u64) -> Vec<f32> {
         frames: Some(conditions.sweeps),
         calibration: Calibration::Measure,
         record: None,
-        made: None,
     };
     let captured = capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap();
     let measured = captured
