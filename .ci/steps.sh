@@ -237,13 +237,10 @@ step_licences() {
     tool cargo-deny 0.20.2
     cargo deny --all-features check licenses bans sources
     cargo deny --manifest-path boards/Cargo.toml --config .deny.toml check --allow license-not-encountered licenses bans sources
-    cargo deny --manifest-path host/python/Cargo.toml --config .deny.toml check --allow license-not-encountered licenses bans sources
     # Advisories are in a repository on GitHub.
     if timeout 20 git ls-remote -q https://github.com/RustSec/advisory-db HEAD >/dev/null 2>&1; then
         cargo deny --all-features check advisories
-        for workspace in boards host/python; do
-            cargo deny --manifest-path $workspace/Cargo.toml --config .deny.toml check --allow advisory-not-detected advisories
-        done
+        cargo deny --manifest-path boards/Cargo.toml --config .deny.toml check --allow advisory-not-detected advisories
     else
         echo "skipped: advisories, no GitHub"
     fi
@@ -377,20 +374,13 @@ step_examples() {
     )
 }
 
-# The package, with the features in FEATURES, and what its tests need in target/python. With the root's way of
-# stripping, the package takes over 130 of its 219 units from the root's release build.
+# The package, and what its tests need in target/python. Nearly all of its crates are of the program's release build.
 python_package() {
     python_with python "$@"
-    CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo \
-        target/python/bin/pip install --quiet --force-reinstall --no-deps \
-        ${FEATURES:+--config-settings=build-args="--features $FEATURES"} ./host/python
+    CARGO_TARGET_DIR=$PWD/target target/python/bin/pip install --quiet --force-reinstall --no-deps ./host/python
 }
 
 step_python() {
-    (cd host/python && cargo fmt --check)
-    # Not `cargo clippy`, which would check each dependency that the package's build compiles.
-    CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo RUSTC_WORKSPACE_WRAPPER=clippy-driver \
-        cargo rustc --locked --release --lib --manifest-path host/python/Cargo.toml -- -D warnings
     python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 nptdms==1.13.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
     cargo build --locked --release
@@ -411,8 +401,7 @@ in_empty_root() {
         echo "skipped: the wheel in an empty root, not Linux"
         return
     fi
-    CARGO_TARGET_DIR=$PWD/target CARGO_PROFILE_RELEASE_STRIP=debuginfo \
-        target/python/bin/pip wheel --quiet --no-deps --wheel-dir "$out/wheel" ./host/python
+    CARGO_TARGET_DIR=$PWD/target target/python/bin/pip wheel --quiet --no-deps --wheel-dir "$out/wheel" ./host/python
     ls -l "$out/wheel"
     target/python/bin/python host/python/tests/empty_root.py "$out"/wheel/*.whl target/release/nirspi
 }

@@ -5,25 +5,12 @@
 //! says so, and the CPU computes (`without_a_gpu_auto_says_so_once_and_goes_on` in
 //! `host/cli/tests/cli/sparse_problems.rs`).
 
-#[cfg(feature = "gpu")]
 use super::print;
 use anyhow::Result;
 use nirspi_recon::omp::Backend;
-#[cfg(not(feature = "gpu"))]
-use nirspi_recon::omp::BackendError;
-#[cfg(feature = "gpu")]
-use nirspi_recon::omp::gpu::{self, Choice};
-
-/// A device to compute on.
-#[cfg(feature = "gpu")]
-pub use nirspi_recon::omp::gpu::Device;
-
-/// No device: this build has no kernels.
-#[cfg(not(feature = "gpu"))]
-pub enum Device {}
+use nirspi_recon::omp::gpu::{self, Choice, Device};
 
 /// The device for a batch of `frames`; `None` means the processor.
-#[cfg(feature = "gpu")]
 pub fn choose(backend: Backend, frames: usize) -> Result<Option<Device>> {
     match gpu::choose(backend, frames)? {
         Choice::Gpu(device) => {
@@ -40,17 +27,7 @@ pub fn choose(backend: Backend, frames: usize) -> Result<Option<Device>> {
 
 /// Says once on stderr why each run compiles the GPU's kernels, if it does.
 pub fn say_slow_start() {
-    #[cfg(feature = "gpu")]
     if let Some(why) = nirspi_recon::backend::probe::kernel_cache_trouble() {
         print::remark(why);
-    }
-}
-
-/// `None`: this build has only the processor.
-#[cfg(not(feature = "gpu"))]
-pub fn choose(backend: Backend, _frames: usize) -> Result<Option<Device>> {
-    match backend {
-        Backend::Auto | Backend::Cpu => Ok(None),
-        Backend::Wgpu | Backend::Cuda => Err(BackendError::not_built().into()),
     }
 }

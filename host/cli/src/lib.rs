@@ -62,11 +62,8 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 
 /// The features of this program, and whether this build has each one.
-const FEATURES: &[(&str, bool)] = &[
-    ("flash", cfg!(feature = "flash")),
-    ("gpu", cfg!(feature = "gpu")),
-    ("wgpu", cfg!(feature = "wgpu")),
-];
+const FEATURES: &[(&str, bool)] =
+    &[("flash", cfg!(feature = "flash")), ("wgpu", cfg!(feature = "wgpu"))];
 
 /// The first twelve digits of the commit of the sources. `None` in builds without optimisation, and where the build script
 /// finds neither git nor a published package.

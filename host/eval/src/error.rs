@@ -134,6 +134,7 @@ from_libraries!(
     crate::training::TrainingCameraError,
     nirspi_virtual::ShotError,
     nirspi_virtual::VirtualOpticsError,
+    nirspi_nets::DeviceEnhancerError,
     nirspi_nets::EnhanceError,
     nirspi_nets::MeasuredRowsError,
     nirspi_nets::classical::ClassicalError,
@@ -163,9 +164,6 @@ from_libraries!(
     std::io::Error,
     serde_json::Error,
 );
-
-#[cfg(feature = "gpu")]
-from_libraries!(nirspi_nets::DeviceEnhancerError);
 
 #[cfg(test)]
 mod tests {

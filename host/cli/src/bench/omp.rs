@@ -95,10 +95,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let report = match device {
         None => omp::on_cpu(&problem, &settings),
-        #[cfg(feature = "gpu")]
         Some(device) => omp::on_gpu(&problem, &settings, &device),
-        #[cfg(not(feature = "gpu"))]
-        Some(device) => match device {},
     };
     let report = report.with_context(named)?;
     if let Some(out) = &args.out {

@@ -80,7 +80,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// The times on the networks' device, and whether the processor plays it.
 fn time(work: &Work, networks: &mut Networks) -> Result<(Timed, bool)> {
     let enhancer = networks.enhancer(Method::default())?;
-    #[cfg(feature = "gpu")]
     if networks.device().backend() != nirspi_nets::Backend::Cpu {
         use anyhow::Context;
         let backend = networks.device().backend();

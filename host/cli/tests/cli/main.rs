@@ -44,7 +44,7 @@ mod readme;
 mod real_data;
 mod reconstruct;
 // The page is of a build with the default features.
-#[cfg(all(feature = "gpu", not(feature = "flash")))]
+#[cfg(not(feature = "flash"))]
 mod reference;
 mod report_page;
 mod selftest;

@@ -1,9 +1,7 @@
 //! Times sparse representations of many frames by orthogonal matching pursuit.
 
-#[cfg(feature = "gpu")]
 mod gpu;
 
-#[cfg(feature = "gpu")]
 pub use gpu::on_gpu;
 
 use super::{FASTEST_SWEEPS_HZ, Times, milliseconds, scenes};

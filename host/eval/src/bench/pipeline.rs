@@ -1,6 +1,5 @@
 //! Times the whole path from measurements to enhanced images on many frames.
 
-#[cfg(feature = "gpu")]
 mod gpu;
 
 use super::{FASTEST_SWEEPS_HZ, Times, scenes};
@@ -14,7 +13,6 @@ use nirspi_recon::{Basis, Order, Side};
 use rayon::prelude::*;
 use serde::Serialize;
 
-#[cfg(feature = "gpu")]
 pub use gpu::on_gpu;
 
 /// What to time.
