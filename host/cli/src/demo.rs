@@ -159,11 +159,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let bar = Progress::of("capture", exposure.frames, "frames");
     let seen = calibrated.capture(&mut times, &mut bar.watch())?;
     drop(bar);
-    let Seen { bench: Bench { optics, .. }, shot, measurements, flat_field, white } = &seen;
+    let Seen { bench: Bench { optics, .. }, shot, measurements, notes, flat_field, white } = &seen;
     let model = optics.camera_model();
     let camera = shot.session.identity().clone();
     let captured = &shot.capture;
-    let mut notes = captured.integrated.warnings();
+    let mut notes = notes.clone();
     let setup = &captured.setup;
     let leak = captured.settling.as_ref().map(|s| s.leak(setup.clocks_per_pattern, setup.blanked));
     let leak = leak.transpose()?;

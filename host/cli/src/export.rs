@@ -2,6 +2,7 @@
 
 use super::camera::ModelArgs;
 use super::print;
+use super::progress::Progress;
 use super::provenance::made;
 use super::report::{Overwrite, ReportArgs, words};
 use anyhow::Result;
@@ -44,7 +45,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         enhance: args.enhance,
         overwrite: args.overwrite.overwrite,
     };
+    let working = Progress::working("export");
     let exported = export(&args.recording, &out, args.to, &options, made())?;
+    drop(working);
     args.report.print_answer(&exported, |exported| {
         exported.warnings.iter().for_each(print::warning);
         print::notes(&exported.notes)?;
@@ -68,6 +71,8 @@ pub struct RecoverArgs {
 }
 
 pub fn recover(args: &RecoverArgs) -> Result<ExitCode> {
+    let working = Progress::working("recover");
     let recovered = recovered(&args.recording, &args.out, args.overwrite.overwrite)?;
+    drop(working);
     args.report.print_answer(&recovered, |recovered| print::line(recovered))
 }

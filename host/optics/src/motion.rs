@@ -73,6 +73,24 @@ pub struct Pose {
     pub turned_deg: f64,
 }
 
+impl Pose {
+    /// The place on the target that lies at this place before the camera, from the centres of both.
+    #[must_use]
+    pub fn on_target(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
+        let (sin, cos) = self.turned_deg.to_radians().sin_cos();
+        let (x, y) = (x_mm - self.x_mm, y_mm - self.y_mm);
+        // The target's own axes have turned clockwise, with y down.
+        [x * cos + y * sin, y * cos - x * sin]
+    }
+
+    /// Where this place on the target lies before the camera.
+    #[must_use]
+    pub fn before_camera(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
+        let (sin, cos) = self.turned_deg.to_radians().sin_cos();
+        [self.x_mm + x_mm * cos - y_mm * sin, self.y_mm + x_mm * sin + y_mm * cos]
+    }
+}
+
 /// A moving target before the projector.
 #[derive(Debug, Clone)]
 pub struct MovingTarget {
@@ -144,13 +162,11 @@ impl MovingTarget {
     /// The mean reflectance under the spot of each LED at this time, 32 x 32, row-major.
     #[must_use]
     pub fn seen(&self, seconds: f64) -> Vec<f32> {
-        let Pose { x_mm, y_mm, turned_deg } = self.pose(seconds);
-        let (sin, cos) = turned_deg.to_radians().sin_cos();
+        let pose = self.pose(seconds);
         let at_mm = |i: usize| (i as f64 + 0.5 - SIDE as f64 / 2.0) * self.pixel_mm;
         let spot = |led: usize| {
-            let (x, y) = (at_mm(led % SIDE) - x_mm, at_mm(led / SIDE) - y_mm);
-            // The target's own axes have turned clockwise, with y down.
-            self.at(x * cos + y * sin, y * cos - x * sin)
+            let [x_mm, y_mm] = pose.on_target(at_mm(led % SIDE), at_mm(led / SIDE));
+            self.at(x_mm, y_mm)
         };
         (0..LEDS).map(spot).collect()
     }

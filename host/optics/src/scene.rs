@@ -7,7 +7,11 @@
 //! the piecewise-constant map (a summed-area table), for any size of the rectangle
 //! (`tests::a_mean_counts_parts_of_pixels_and_the_surround`).
 
+use crate::motion::Pose;
 use thiserror::Error;
+
+/// Pixels along the side of a target that a motion has taken elsewhere.
+const POSED_PX: usize = 512;
 
 /// Why a reflectance map is not a scene.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -198,6 +202,26 @@ impl Scene {
         let area_px2 = 4.0 * half_px * half_px;
         let diffuse = (inside + f64::from(self.surround) * (area_px2 - covered_px2)) / area_px2;
         self.specular.map_or(diffuse, |spot| diffuse + spot.mean_over_square(x_mm, y_mm, width_mm))
+    }
+
+    /// The same target where a motion has taken it: what of it lies in a square of side `side_mm` around the axis. A specular
+    /// spot keeps its place on the target, and its sides those of the square.
+    #[must_use]
+    pub fn posed(&self, pose: Pose, side_mm: f64) -> Self {
+        let pixel_mm = side_mm / POSED_PX as f64;
+        let at_mm = |i: usize| (i as f64 + 0.5) * pixel_mm - side_mm / 2.0;
+        let diffuse = Self { specular: None, ..self.clone() };
+        let of_pixel = |pixel: usize| {
+            let [x_mm, y_mm] = pose.on_target(at_mm(pixel % POSED_PX), at_mm(pixel / POSED_PX));
+            diffuse.mean_over_square(x_mm, y_mm, pixel_mm).clamp(0.0, 1.0) as f32
+        };
+        let reflectance: Vec<f32> = (0..POSED_PX * POSED_PX).map(of_pixel).collect();
+        let summed = summed_area(&reflectance, POSED_PX);
+        let specular = self.specular.map(|spot| {
+            let [x_mm, y_mm] = pose.before_camera(spot.x_mm, spot.y_mm);
+            Specular { x_mm, y_mm, ..spot }
+        });
+        Self { reflectance, size_px: POSED_PX, side_mm, specular, summed, ..diffuse }
     }
 
     /// Integral of the map over [0, x] x [0, y], in pixels, for x and y in [0, `size_px`].

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::{CameraModel, Motion, MovingTarget, Projector, Scene};
+use nirspi_optics::{CameraModel, Motion, MovingTarget, Projector, Scene, Specular};
 use proptest::prelude::*;
 
 const DISTANCE_MM: f64 = 300.0;
@@ -66,6 +66,24 @@ proptest! {
             let inside = (0..32).contains(&x) && (0..32).contains(&y);
             let expected = if inside { rest.weights()[(y * 32 + x) as usize] } else { 0.0 };
             prop_assert!((seen - expected).abs() < 0.01, "{at}: {seen} {expected}");
+        }
+    }
+}
+
+/// Within the field: the light of the lens's blur that comes from beyond it is the surround's.
+#[test]
+fn a_target_at_rest_elsewhere_is_seen_as_the_moving_one() {
+    let spot = Specular { times: 3.0, x_mm: 4.0, y_mm: -2.0, side_mm: 2.0 };
+    let shining = patch(20.0).with_specular(spot).unwrap();
+    // The sides of a spot do not turn.
+    for (scene, turning_deg_per_s) in [(patch(20.0), 900.0), (shining, 0.0)] {
+        let motion = Motion { speed_m_per_s: 0.05, direction_deg: 30.0, turning_deg_per_s };
+        for seconds in [0.0, 0.02, 0.1, 0.15] {
+            let target = moving(motion, &scene, DISTANCE_MM);
+            let posed = scene.posed(target.pose(seconds), projector().field_mm(DISTANCE_MM));
+            let found = projector().footprint(&posed, DISTANCE_MM).unwrap();
+            let difference = largest_difference(&target.seen(seconds), found.weights());
+            assert!(difference < 0.02, "after {seconds} s: {difference}");
         }
     }
 }

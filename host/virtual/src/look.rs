@@ -17,9 +17,10 @@ use super::{
 };
 use crate::panels::SCENE_PX;
 use nirspi::calibration::FlatField;
-use nirspi::capture::{Progress, StopCause};
+use nirspi::capture::{Capture, Progress, StopCause};
 use nirspi::exposure::{Exposure, Length, Light, LightError};
 use nirspi::imaging::{KnownReadings, MethodReport, share_of_white};
+use nirspi::moving::followed;
 use nirspi::picture::{Figure, FigureStyle, Panel, Unit};
 use nirspi::provenance::{Made, Provenance, Taken};
 use nirspi::response::Settling;
@@ -176,24 +177,37 @@ impl Calibrated {
         times: &mut StageTimes,
         watch: &mut dyn FnMut(&Progress) -> ControlFlow<StopCause>,
     ) -> Result<Seen, ShotError> {
-        let Self { bench, settling, flat_field, white } = self;
-        let Bench { optics, setup, frames, seed } = &bench;
-        let setup = setup.clone();
-        let shot =
-            times.time("capture", || shoot(optics, setup, &settling, *frames, *seed, watch))?;
-        let measurements = shot.measurements()?;
-        Ok(Seen { bench, shot, measurements, flat_field, white })
+        let Self { bench: Bench { optics, setup, frames, seed }, settling, flat_field, white } =
+            self;
+        let frame_ns = setup.frame_ns();
+        let mut newest_s = 0.0;
+        let mut watch = |progress: &Progress| {
+            // Frames come one after the other without a pause, and the last of them may come after the last call.
+            let to_come = u64::from(frames).saturating_sub(progress.counters.received) as f64;
+            newest_s = progress.device_time_us as f64 * 1e-6 + (to_come + 0.5) * frame_ns * 1e-9;
+            watch(progress)
+        };
+        let shot = times.time("capture", || {
+            shoot(&optics, setup.clone(), &settling, frames, seed, &mut watch)
+        })?;
+        let Capture { integrated, setup: taken, settling, .. } = &shot.capture;
+        let (measurements, notes) = followed(integrated, taken, settling.as_ref(), false)?;
+        let optics = optics.at_time(newest_s).map_err(VirtualOpticsError::from)?;
+        let bench = Bench { optics, setup, frames, seed };
+        Ok(Seen { bench, shot, measurements, notes, flat_field, white })
     }
 }
 
 /// A scene as the virtual camera has measured it.
 pub struct Seen {
-    /// Camera, scene and measurement.
+    /// Camera, scene and measurement. A target that moves is where the newest frame has seen it.
     pub bench: Bench,
     /// The frames and their account.
     pub shot: Shot,
-    /// The measurements of their sum.
+    /// The measurements of their sum, or of the newest frames along the way of a target that moves.
     pub measurements: Measurements,
+    /// What is to be said of the frames.
+    pub notes: Vec<String>,
     /// The camera's flat field; `None` if its LEDs are alike.
     pub flat_field: Option<FlatField>,
     /// ADC counts of a pixel that sees the white sheet.
@@ -292,6 +306,7 @@ impl SeenPicture {
 mod tests {
     use super::*;
     use nirspi::imaging::score;
+    use nirspi_optics::Motion;
     use nirspi_recon::Side;
 
     #[test]
@@ -307,6 +322,23 @@ mod tests {
         assert!((0.8..=1.0).contains(&brightest), "{brightest}");
         assert_eq!(picture.warnings, [""; 0]);
         assert!(picture.png().starts_with(b"\x89PNG"));
+    }
+
+    #[test]
+    fn a_letter_that_moves_is_scored_where_its_newest_frame_has_seen_it() {
+        let mut bench = Look::paper().at("letter:R").unwrap();
+        let motion = Motion { speed_m_per_s: 0.5, direction_deg: 90.0, ..Motion::default() };
+        bench.optics = bench.optics.moving(motion).unwrap();
+        let seen = bench.capture().unwrap();
+        assert!(
+            seen.notes.iter().any(|note| note.contains("added along its way")),
+            "{:?}",
+            seen.notes
+        );
+        let image = seen.reconstruct(Method::PRIOR, &nirspi_nets::prior::settings()).unwrap().image;
+        let truth = seen.bench.optics.focused_footprint().unwrap();
+        let quality = score(&image, truth.weights()).unwrap();
+        assert!(quality.psnr_db.is_some_and(|psnr| psnr > 24.0), "{quality}");
     }
 
     #[test]

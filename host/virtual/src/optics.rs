@@ -236,6 +236,17 @@ impl VirtualOptics {
         MovingTarget::new(self.motion, &projector, &self.scene, self.distance_mm).map(Some)
     }
 
+    /// The same camera before its target at rest, where the motion has taken it after `seconds`.
+    ///
+    /// # Errors
+    /// Does not occur for optics that could be built, because the distance is the same.
+    pub fn at_time(&self, seconds: f64) -> Result<Self, ProjectorError> {
+        let Some(target) = self.moving_target()? else { return Ok(self.clone()) };
+        let scene = self.scene.posed(target.pose(seconds), self.field_mm());
+        let footprint = self.camera.projector().footprint(&scene, self.distance_mm)?;
+        Ok(Self { scene, footprint, motion: Motion::default(), ..self.clone() })
+    }
+
     /// Puts weather between camera and scene. Daylight is dimmed and scattered by the average
     /// effect. The effect of falling drops on the LEDs' light is computed drop by drop.
     ///
