@@ -40,7 +40,7 @@ fn of_feed(error: FeedError) -> PyErr {
 
 /// Whether Python goes on: no Ctrl-C and no other signal that raises. The exception is kept.
 fn goes_on(raised: &Mutex<Option<PyErr>>) -> bool {
-    match Python::attach(|py| py.check_signals()) {
+    match Python::attach(Python::check_signals) {
         Ok(()) => true,
         Err(error) => {
             *lock(raised) = Some(error);

@@ -84,7 +84,7 @@ pub fn long<T: Send>(
             let mut interrupt = None;
             while is_done.recv_timeout(SIGNALS) == Err(RecvTimeoutError::Timeout) {
                 if interrupt.is_none() {
-                    interrupt = Python::attach(|py| py.check_signals()).err();
+                    interrupt = Python::attach(Python::check_signals).err();
                     stop.store(interrupt.is_some(), Ordering::Relaxed);
                 }
             }
