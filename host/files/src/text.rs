@@ -7,9 +7,12 @@
 //! decimal only if the user says so, or if the file shows it in one of three ways: numbers are
 //! separated by semicolons, tabs or blanks; a number has digits that a whole number does not have,
 //! as in `0,05` or `1,5E-3`; some numbers of a line have commas and others have none. One comma a
-//! line, under a heading with one comma, separates two columns.
+//! line, under a heading of two names, separates two columns.
 
 mod export;
+mod number;
+
+pub(super) use number::parse;
 
 use super::FileError;
 use super::field::{EXPECTED, Field};
@@ -17,17 +20,6 @@ use super::plain::{is_heading, read_large_text, start_of_text};
 use crate::provenance;
 use rayon::prelude::*;
 use std::path::Path;
-
-/// Words for a reading that was not taken.
-const UNREAD: [&str; 12] = [
-    "nan", "null", "na", "none", "#n/a", "n/a", "#num!", "-1.#ind", "1.#qnan", "-nan", "--", "---",
-];
-
-/// Words for a reading beyond what an instrument measures.
-const OVERLOADED: [&str; 7] = ["∞", "+∞", "ol", "o.l", "o.l.", "ovld", "overload"];
-
-/// What instruments write themselves for such a reading.
-const OVERLOAD: f64 = 9.9e37;
 
 /// What a text file holds.
 pub(super) struct Text {
@@ -170,8 +162,8 @@ struct Lines<'t> {
     marks: Vec<char>,
 }
 
-/// What may stand between or in numbers.
-const MARKS: [char; 5] = [';', '\t', ',', '.', ' '];
+/// What may stand between, in or around numbers.
+const MARKS: [char; 6] = [';', '\t', ',', '.', ' ', '"'];
 
 /// Bytes, and lines, that one thread takes at a time.
 const PIECE: usize = 1 << 20;
@@ -257,7 +249,8 @@ fn plain(path: &Path, lines: &Lines<'_>, decimal_comma: bool) -> Result<Numbers,
     let real = numbers_of(path, body, &separators, width)?;
     let height = body.len();
     let names: Option<Vec<String>> = heading.map(|heading| {
-        separators.split(heading).map(|name| name.trim_matches('"').to_owned()).collect()
+        let names = Words::of(separators.open(heading), separators.between, true);
+        names.map(|name| name.trim_matches('"').to_owned()).collect()
     });
     Ok(match names.filter(|names| names.len() == width) {
         Some(names) => Numbers::Columns(names.into_iter().zip(columns_of(&real, width)).collect()),
@@ -324,6 +317,8 @@ struct Separators {
     /// Whether every line ends with the separator. The last separator then closes the line and
     /// starts no further number.
     closes: bool,
+    /// Whether numbers stand in quotes. A separator in quotes separates nothing.
+    quotes: bool,
 }
 
 impl Separators {
@@ -338,7 +333,8 @@ impl Separators {
         let between = [';', '\t'].into_iter().find(|&mark| has(mark));
         let decimal = |between: Option<char>, decimal| {
             let ends = |mark| body.iter().all(|(_, line)| line.ends_with(mark));
-            Ok(Self { between, decimal, closes: between.is_some_and(ends) })
+            let closes = between.is_some_and(ends);
+            Ok(Self { between, decimal, closes, quotes: has('"') })
         };
         if decimal_comma {
             return decimal(between, ',');
@@ -384,7 +380,8 @@ impl Separators {
                 return decimal(None, ',');
             }
             // Two names head two columns.
-            if heading.is_some_and(|heading| heading.matches(',').count() == 1) {
+            let names = |heading| Words::of(heading, Some(','), true).count();
+            if heading.is_some_and(|heading| names(heading) == 2) {
                 return decimal(Some(','), '.');
             }
             return Err(FileError::field(
@@ -397,11 +394,15 @@ impl Separators {
         decimal(Some(','), '.')
     }
 
+    /// The line without the separator that closes it.
+    fn open<'l>(&self, line: &'l str) -> &'l str {
+        let closing = self.between.filter(|_| self.closes);
+        closing.map_or(line, |mark| line.strip_suffix(mark).unwrap_or(line))
+    }
+
     /// The words between separators.
     fn split<'l>(&self, line: &'l str) -> Words<'l> {
-        let closing = self.between.filter(|_| self.closes);
-        let line = closing.map_or(line, |mark| line.strip_suffix(mark).unwrap_or(line));
-        Words::of(line, self.between, false)
+        Words::of(self.open(line), self.between, self.quotes)
     }
 }
 
@@ -482,70 +483,6 @@ fn trimmed(word: &str) -> &str {
 fn is_bare(text: &str) -> bool {
     let is_plain = |byte: Option<&u8>| byte.is_some_and(|byte| matches!(byte, b'!'..=b'~'));
     is_plain(text.as_bytes().first()) && is_plain(text.as_bytes().last())
-}
-
-/// The number that a word states, with the point or comma of its decimals; NaN for a reading that was not
-/// taken, 9.9e37 for one beyond what an instrument measures.
-pub(super) fn parse(word: &str, decimal: char) -> Option<f64> {
-    let bytes = word.as_bytes();
-    let word = match bytes.first() == Some(&b'"') || bytes.last() == Some(&b'"') {
-        true => word.trim_matches('"'),
-        false => word,
-    };
-    plain_number(word, decimal).or_else(|| odd_number(word, decimal))
-}
-
-/// The longest of [`UNREAD`] and [`OVERLOADED`].
-const LONGEST_WORD: usize = 8;
-
-/// What is no plain number.
-#[inline(never)]
-fn odd_number(word: &str, decimal: char) -> Option<f64> {
-    // A long word is an exponent of Fortran or what NumPy prints, or no number.
-    let has_exponent = || word.bytes().any(|byte| matches!(byte, b'd' | b'D'));
-    if word.len() > LONGEST_WORD
-        && word.is_ascii()
-        && !word.starts_with(['n', 'N'])
-        && !has_exponent()
-    {
-        return None;
-    }
-    let lower = word.to_lowercase();
-    if word.is_empty() || UNREAD.contains(&lower.as_str()) {
-        return Some(f64::NAN);
-    }
-    if OVERLOADED.contains(&lower.as_str()) {
-        return Some(OVERLOAD);
-    }
-    if lower == "-∞" || lower == "−∞" {
-        return Some(-OVERLOAD);
-    }
-    // What NumPy 2 prints, and Fortran's exponents.
-    let printed = ["np.float64(", "np.float32(", "np.int64("].iter();
-    let inner = printed.filter_map(|by| lower.strip_prefix(by)?.strip_suffix(')')).next();
-    let plain = inner.unwrap_or(&lower).replace('−', "-");
-    let is_exponent = plain.contains(|c: char| c.is_ascii_digit()) && plain.contains('d');
-    plain_number(&if is_exponent { plain.replacen('d', "e", 1) } else { plain }, decimal)
-}
-
-/// The longest number with a decimal comma that is read without an allocation.
-const SHORT: usize = 32;
-
-fn plain_number(word: &str, decimal: char) -> Option<f64> {
-    match decimal {
-        '.' => word.parse().ok(),
-        _ if word.contains('.') => None,
-        ',' if word.len() <= SHORT => {
-            let mut bytes = [0; SHORT];
-            let with_point = &mut bytes[..word.len()];
-            with_point.copy_from_slice(word.as_bytes());
-            if let Some(comma) = with_point.iter_mut().find(|byte| **byte == b',') {
-                *comma = b'.';
-            }
-            std::str::from_utf8(with_point).ok()?.parse().ok()
-        }
-        _ => word.replacen(decimal, ".", 1).parse().ok(),
-    }
 }
 
 fn shortened(word: &str) -> String {

@@ -5,9 +5,8 @@
 //! No number of a table is lost in silence: what is left out is no line of numbers like those of the
 //! table, and is told (`tests::a_table_with_a_gap_is_refused_as_before`).
 
-use super::{
-    BLOCK, Line, Lines, OVERLOAD, Separators, Words, columns_of, numbers_of, parse, shortened,
-};
+use super::number::{OVERLOAD, sign};
+use super::{BLOCK, Line, Lines, Separators, Words, columns_of, numbers_of, parse, shortened};
 use crate::FileError;
 use crate::field::Field;
 use nirspi_recon::words::count_of;
@@ -97,12 +96,14 @@ pub(super) fn find(
     Some(Ok(Found { columns, names, skipped }))
 }
 
-/// Whether a line outside of a table is a row like those of the table: numbers in the columns with numbers,
+/// Whether a line outside of a table is a row like those of the table: numbers or signs in the columns that have them,
 /// of which a few may be missing.
 fn is_row(line: &str, separators: &Separators, width: usize, numeric: &[usize]) -> bool {
     let row: Vec<&str> = cells(line, separators.between).collect();
     row.len() == width
-        && numeric.iter().all(|&at| parse(row[at], separators.decimal).is_some())
+        && numeric
+            .iter()
+            .all(|&at| parse(row[at], separators.decimal).or_else(|| sign(row[at])).is_some())
         && numeric.iter().any(|&at| !row[at].is_empty())
 }
 
@@ -173,7 +174,8 @@ impl Table {
         // At least half of the column's cells are numbers.
         let is_numeric = |&at: &usize| 2 * count(|block| &block.numbers, at) >= body.len();
         let (numeric, words): (Vec<usize>, Vec<usize>) = (0..width).partition(is_numeric);
-        let words = words.into_iter().filter(|&at| count(|block| &block.filled, at) > 0).collect();
+        let words: Vec<usize> =
+            words.into_iter().filter(|&at| count(|block| &block.filled, at) > 0).collect();
         // A last line of totals.
         let is_row = |(_, line): &Line<'_>| is_row(line, &separators, width, &numeric);
         let rows_end = body.iter().rposition(is_row).map_or(0, |last| last + 1);
@@ -195,7 +197,18 @@ impl Table {
                 cells.take(rows_end).map(|cell| cell.unwrap_or(f64::NAN)).collect();
             Field { shape: vec![real.len()], real, imaginary: None }
         };
-        let columns: Vec<Field> = numeric.par_iter().map(column).collect();
+        let mut columns: Vec<(usize, Field)> =
+            numeric.par_iter().map(|at| (*at, column(at))).collect();
+        // A column of plus and minus says which readings are of patterns.
+        let signs = |at: usize| -> Option<Field> {
+            let word = |(_, line): &Line<'_>| cells(line, between).nth(at).and_then(sign);
+            let real: Vec<f64> = body[..rows_end].iter().map(word).collect::<Option<_>>()?;
+            Some(Field { shape: vec![real.len()], real, imaginary: None })
+        };
+        columns.extend(words.iter().filter_map(|&at| Some((at, signs(at)?))));
+        columns.sort_by_key(|(at, _)| *at);
+        let (numeric, columns): (Vec<usize>, Vec<Field>) = columns.into_iter().unzip();
+        let words = words.into_iter().filter(|at| !numeric.contains(at)).collect();
         Some(Ok(Self { separators, width, numeric, columns, words, ends }))
     }
 }
@@ -242,10 +255,10 @@ impl Block {
 fn longest(lines: &[Line<'_>], marks: &[char]) -> Option<std::ops::Range<usize>> {
     let (mut best, mut parted) = (0..0, None);
     let mut has_whole = false;
-    // A number with a comma is one with a decimal comma.
+    // A number with a comma is one with a decimal comma, or one with marks between its thousands.
     let is_number = |word: &str| {
-        let decimal = if word.contains(',') { ',' } else { '.' };
-        !word.trim_matches('"').is_empty() && parse(word, decimal).is_some()
+        !word.trim_matches('"').is_empty()
+            && (word.contains(',') && parse(word, ',').is_some() || parse(word, '.').is_some())
     };
     for between in [Some(';'), Some('\t'), Some(','), None] {
         if !marks.contains(&between.unwrap_or(' ')) {
@@ -433,6 +446,14 @@ mod tests {
         // R quotes its names, of which the first is empty.
         let text = format!("\"\",\"y\"\n{}", rows(|k| format!("\"{k}\",{}", y(k))));
         assert_eq!(columns(&text).0, [expected("", k), expected("y", y)]);
+        // Plus and minus are signs, in a column of nothing else.
+        let is_minus = |k: u32| k % 2 == 1;
+        for minus in ["-", "\u{2212}", "\"-\""] {
+            let sign = |k: u32| if is_minus(k) { minus } else { "+" };
+            let text = format!("sign,y\n{}", rows(|k| format!("{},{}", sign(k), y(k))));
+            let signs = expected("sign", |k| if is_minus(k) { -1.0 } else { 1.0 });
+            assert_eq!(columns(&text), (vec![signs, expected("y", y)], String::new()), "{minus}");
+        }
         // Two columns of one name.
         let text = format!("y,y\n{}", rows(|k| format!("{},{k}", y(k))));
         let (found, told) = columns(&text);

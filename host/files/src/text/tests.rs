@@ -1,3 +1,4 @@
+use super::number::OVERLOAD;
 use super::*;
 use crate::testing::{file, line};
 use proptest::collection::vec;
@@ -208,4 +209,46 @@ fn words_of_instruments_for_no_reading_and_for_too_much() {
     let (_, numbers) = table("1.5\n--\n---\nO.L\n2\n");
     assert!(numbers[1].is_nan() && numbers[2].is_nan());
     assert_eq!((numbers[0], numbers[3], numbers[4]), (1.5, 9.9e37, 2.0));
+    for unread in ["#VALUE!", "#DIV/0!", "#REF!", "1.#IND", "-1.#QNAN", "nan(ind)", "-nan(ind)"] {
+        let (_, numbers) = table(&format!("0,1.5\n1,{unread}\n2,3.5\n"));
+        assert!(numbers[3].is_nan() && numbers[5] == 3.5, "{unread}");
+    }
+    for over in ["Over", "OVERFLOW", "1.#INF"] {
+        assert_eq!(table(&format!("1.5\n{over}\n-1.#INF\n")).1, [1.5, OVERLOAD, -OVERLOAD]);
+    }
+}
+
+#[test]
+fn what_is_in_quotes_is_one_cell() {
+    for (heading, names) in [
+        ("\"time, s\",\"signal, V\"", ["time, s", "signal, V"]),
+        ("time,\"Power, W\"", ["time", "Power, W"]),
+        ("\"time\",\"y\"", ["time", "y"]),
+    ] {
+        for row in ["0.5,15\n", "\"0.5\",\"15\"\n"] {
+            let content = format!("{heading}\n{}", row.repeat(9));
+            let (_folder, path) = file("y.csv", content.as_bytes());
+            let read = read(&path, false).unwrap();
+            let Numbers::Columns(columns) = read.numbers else { panic!("columns of {content}") };
+            let found: Vec<&str> = columns.iter().map(|(name, _)| &**name).collect();
+            assert_eq!(found, names);
+            assert_eq!((columns[0].1.real[8], columns[1].1.real[8]), (0.5, 15.0), "{content}");
+        }
+    }
+    // Two names in quotes head one column each, however many commas they have.
+    let (_folder, path) = file("y.csv", b"\"time, s\",y\n0,15\n3,-4\n");
+    let Numbers::Columns(columns) = read(&path, false).unwrap().numbers else { panic!("columns") };
+    assert_eq!((&*columns[0].0, &columns[1].1.real), ("time, s", &vec![15.0, -4.0]));
+}
+
+#[test]
+fn thousands_may_be_grouped_where_no_mark_is_a_separator() {
+    assert_eq!(table("\"83,770.02\"\n\"1,234,567\"\n\"12.5\"\n").1, [83770.02, 1_234_567.0, 12.5]);
+    assert_eq!(table("0,5;83.770,02\n1,5;-1.234.567\n").1, [0.5, 83770.02, 1.5, -1_234_567.0]);
+    // One mark and no decimals may be a decimal mark; groups have three digits.
+    for other in ["\"83,770\"\n\"1.5\"\n", "\"83,77.02\"\n\"1.5\"\n", "0,5;1.5,3.7\n2,5;1,5\n"] {
+        let (_folder, path) = file("y.csv", other.as_bytes());
+        let message = line(&read(&path, false).err().unwrap(), "y.csv");
+        assert!(message.contains(", expected "), "{other}: {message}");
+    }
 }
