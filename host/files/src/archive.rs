@@ -75,6 +75,11 @@ impl Archive {
             .iter()
             .filter_map(|name| name.strip_suffix(MEMBER_SUFFIX).map(str::to_owned))
             .collect();
+        if let ([], Some(first)) = (&names[..], members.first()) {
+            let first: String = first.chars().take(60).collect();
+            let found = format!("a zip archive without arrays, with {first:?} in it (unpack it)");
+            return Err(FileError::kind(path, found, EXPECTED));
+        }
         names.sort_unstable();
         Ok(Self { path: path.to_owned(), zip, names })
     }

@@ -12,7 +12,9 @@ use super::hdf5::Hdf5;
 use super::mat::Mat;
 use super::mat4::Mat4;
 use super::npy;
-use super::plain::{is_mat_4, kind_by_start, open_file, open_start, read_small_text};
+use super::plain::{
+    is_mat_4, kind_by_start, kind_of, kind_of_text, open_file, open_start, read_small_text,
+};
 use super::stored::Stored;
 use super::text;
 use super::wav;
@@ -108,6 +110,8 @@ impl Fields {
                     (names.collect(), Format::Columns(channels))
                 }
             }
+        } else if let Some(kind) = kind_of_text(&start) {
+            return Err(FileError::kind(path, kind, EXPECTED));
         } else if text::is_start(&start) {
             let text = text::read(path, decimal_comma)?;
             (skipped, provenance, is_text) = (text.skipped, text.provenance, true);
@@ -119,7 +123,7 @@ impl Fields {
                 text::Numbers::Table(field) => (Vec::new(), Format::Unnamed(field)),
             }
         } else {
-            return Err(FileError::kind(path, kind_by_start(&start), EXPECTED));
+            return Err(FileError::kind(path, kind_of(path, &start), EXPECTED));
         };
         let is_of_text = matches!(format, Format::Columns(_) | Format::Unnamed(_)) && !is_wav;
         if decimal_comma && !is_of_text {

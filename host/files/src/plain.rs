@@ -197,6 +197,49 @@ fn read_bytes(path: &Path, expected: &'static str, most_mib: u64) -> Result<Vec<
     }
 }
 
+/// The kind of a file of another program by its first bytes, or else by the end of its name: some programs change the first
+/// bytes with each version.
+#[cfg(not(target_family = "wasm"))]
+pub(super) fn kind_of(path: &Path, start: &[u8]) -> &'static str {
+    const ENDS: &[(&str, &str)] = &[
+        ("wfm", "a waveform file (.wfm; save it as CSV)"),
+        ("isf", "a waveform file of Tektronix (.isf; save it as CSV)"),
+        ("tdms", "a TDMS file of LabVIEW that is damaged"),
+        ("psdata", "a file of PicoScope (.psdata; save it as CSV or MATLAB)"),
+        ("pt", "tensors of PyTorch (save the array with NumPy)"),
+        ("pth", "tensors of PyTorch (save the array with NumPy)"),
+        ("pkl", "a pickle of Python (save its array with NumPy)"),
+        ("pickle", "a pickle of Python (save its array with NumPy)"),
+        ("bin", "a file of another kind, or numbers without a heading (nirspi readings --raw)"),
+        ("dat", "a file of another kind, or numbers without a heading (nirspi readings --raw)"),
+        ("raw", "a file of another kind, or numbers without a heading (nirspi readings --raw)"),
+    ];
+    let by_start = kind_by_start(start);
+    if by_start != UNKNOWN {
+        return by_start;
+    }
+    let end = path.extension().and_then(|end| end.to_str()).unwrap_or_default();
+    let by_end = ENDS.iter().find(|(known, _)| end.eq_ignore_ascii_case(known));
+    by_end.map_or(UNKNOWN, |&(_, kind)| kind)
+}
+
+/// The kind of a text that other programs read, and that holds no table.
+#[cfg(not(target_family = "wasm"))]
+pub(super) fn kind_of_text(start: &[u8]) -> Option<&'static str> {
+    let begins = |begin: &&[u8]| start.starts_with(begin);
+    // Of protocol 0, which Python 2 writes.
+    const PICKLES: [&[u8]; 5] = [b"(lp", b"(dp", b"(tp", b"cnumpy", b"ccopy_reg"];
+    if PICKLES.iter().any(begins) {
+        return Some("a pickle of Python (save its array with NumPy)");
+    }
+    let text: Vec<u8> =
+        start.iter().copied().filter(|byte| !byte.is_ascii_whitespace()).take(2).collect();
+    (text == b"{\"" || text == b"[{").then_some("a JSON text (save its numbers as CSV)")
+}
+
+/// A file of a kind that is not known.
+const UNKNOWN: &str = "a file of another kind";
+
 /// The kind of a file by its first bytes. An error message uses the kind to tell a user which file
 /// was chosen by mistake.
 pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
@@ -224,6 +267,10 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         (b"\xf0\xf0:WFM", "a waveform file of Tektronix (.wfm; save it as CSV)"),
         (b"\xd0\xcf\x11\xe0", "an old workbook of Excel (.xls; save it as CSV)"),
         (b"\xa5\xa5", "a waveform file (.wfm; save it as CSV)"),
+        (b"PAR1", "a Parquet file (save it as CSV)"),
+        (b"II*\0", "a TIFF image"),
+        (b"MM\0*", "a TIFF image"),
+        (b"%PDF", "a PDF document"),
     ];
     match start {
         [0x80, 2, 0x8a, b'\n', ..] => return "tensors of PyTorch (save the array with NumPy)",
@@ -231,12 +278,13 @@ pub(super) fn kind_by_start(start: &[u8]) -> &'static str {
         _ if start.windows(8).any(|word| word == b"WAVEDESC") => {
             return "a waveform file of LeCroy (.trc; save it as CSV)";
         }
+        // The short form of the heading that oscilloscopes send.
+        _ if start.windows(6).any(|word| word == b"BIT_N " || word == b"BIT_NR") => {
+            return "a waveform file of Tektronix (.isf; save it as CSV)";
+        }
         _ => {}
     }
-    KINDS
-        .iter()
-        .find(|(magic, _)| start.starts_with(magic))
-        .map_or("a file of another kind", |&(_, kind)| kind)
+    KINDS.iter().find(|(magic, _)| start.starts_with(magic)).map_or(UNKNOWN, |&(_, kind)| kind)
 }
 
 /// Whether a file with these first bytes is a MATLAB file of level 4: five words, of which the first is the form of the
@@ -301,9 +349,33 @@ mod tests {
             (b"\x80\x03cnumpy", "a pickle of Python (save its array with NumPy)"),
             (b"#9000001024WAVEDESC", "a waveform file of LeCroy (.trc; save it as CSV)"),
             (b"\xa5\xa5\xa4\x01", "a waveform file (.wfm; save it as CSV)"),
+            (b"BYT_N 2;BIT_N 16;ENC BIN", "a waveform file of Tektronix (.isf; save it as CSV)"),
+            (b"PAR1\x15", "a Parquet file (save it as CSV)"),
             (b"\x80\x01", "a file of another kind"),
         ] {
             assert_eq!(kind_by_start(start), kind);
+        }
+        // By the end of the name where the bytes say nothing.
+        for (name, kind) in [
+            ("a.WFM", "a waveform file (.wfm; save it as CSV)"),
+            ("a.psdata", "a file of PicoScope (.psdata; save it as CSV or MATLAB)"),
+            ("adc.bin", "numbers without a heading (nirspi readings --raw)"),
+            ("a.thing", "a file of another kind"),
+        ] {
+            let found = kind_of(Path::new(name), b"\x01\xff\x01\xff");
+            assert!(found.ends_with(kind), "{name}: {found}");
+        }
+        assert_eq!(kind_of(Path::new("a.wfm"), b"\x89PNG"), "a PNG image");
+        for (start, kind) in [
+            (&b"(lp0\nF83.7"[..], "a pickle of Python"),
+            (b"cnumpy.core.multiarray\n_reconstruct", "a pickle of Python"),
+            (b"{\n \"y\": [1, 2]}", "a JSON text"),
+            (b"[ {\"y\": 1}]", "a JSON text"),
+        ] {
+            assert!(kind_of_text(start).is_some_and(|found| found.starts_with(kind)));
+        }
+        for table in [&b"{1,2.5}"[..], b"[[1, 2]]", b"(1, 2)", b"\"t\",y\n", b"", b"l,d"] {
+            assert_eq!(kind_of_text(table), None);
         }
     }
 

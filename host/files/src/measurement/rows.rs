@@ -48,22 +48,17 @@ pub(super) fn shown(
     let count = length / each / sweeps;
     let side = match side {
         Some(side) => side,
-        None => {
-            let side = Side::new(count.isqrt() as u64).ok().filter(|side| side.area() == count);
-            side.ok_or_else(|| {
-                let single = Side::new(length.isqrt() as u64).ok().filter(|side| side.area() == length);
-                let hint = match single {
-                    Some(_) if each == 2 => {
-                        "; one value a pattern is read with --readings single or --readings differences"
-                    }
-                    _ => "",
-                };
-                refuse(
-                    format!("has {length} readings, of {count} patterns ({})", meaning(form)),
-                    format!("those of a full sweep of n * n patterns, n a power of two, or --side N{hint}"),
-                )
-            })?
-        }
+        None => side_of_sweep(count).ok_or_else(|| {
+            let axes: Vec<usize> =
+                shape.iter().filter(|&&axis| axis != 1).map(|&axis| axis as usize).collect();
+            let hint = hint(&axes, length, form, want.patterns_first).unwrap_or_default();
+            refuse(
+                format!("has {length} readings, of {count} patterns ({})", meaning(form)),
+                format!(
+                    "those of a full sweep of n * n patterns, n a power of two, or --side N{hint}"
+                ),
+            )
+        })?,
     };
     let (n, area) = (side.pixels(), side.area());
     if count > area {
@@ -85,6 +80,51 @@ pub(super) fn shown(
     let rows = sweep.repeat(sweeps);
     Ok((side, rows, NamedReadings::new(label.clone(), layout, numbers)))
 }
+
+/// The side of a sweep of this many patterns.
+fn side_of_sweep(patterns: usize) -> Option<Side> {
+    Side::new(patterns.isqrt() as u64).ok().filter(|side| side.area() == patterns)
+}
+
+/// What may be meant by readings whose number is no full sweep, and how they are then read. `axes` are those longer than 1.
+fn hint(axes: &[usize], length: usize, form: Form, patterns_first: bool) -> Option<String> {
+    let each = form.readings();
+    if let [height, width] = *axes
+        && !patterns_first
+    {
+        if height == width && Side::new(width as u64).is_ok() && each == 2 {
+            return Some(format!(
+                "; a spectrum of {height} x {width} is read with --side {width} and --readings differences or single"
+            ));
+        }
+        if height.is_multiple_of(each) && side_of_sweep(height / each).is_some() {
+            return Some(format!(
+                "; patterns are along its first axis: add --patterns-first, or, if its last axis has samples of one reading, \
+                 nirspi readings --samples {width}"
+            ));
+        }
+    }
+    if each == 2 && side_of_sweep(length).is_some() {
+        let single =
+            "; one value a pattern is read with --readings single or --readings differences";
+        return Some(single.to_owned());
+    }
+    let several = |times: &usize| {
+        let patterns = (length / each).checked_div(*times)?;
+        let side = side_of_sweep(patterns).filter(|side| side.pixels() >= LEAST_OF_SEVERAL)?;
+        (patterns * times * each == length).then(|| side.pixels())
+    };
+    let times = (2..=MOST_TIMES).find(|times| several(times).is_some())?;
+    let n = several(&times)?;
+    Some(format!(
+        "; {times} sweeps of {n} x {n} patterns are read with --sweeps {times}, {times} samples of each reading with \
+         nirspi readings --samples {times}"
+    ))
+}
+
+/// The most sweeps, or samples of a reading, that a refusal names, and the smallest side of their images.
+const MOST_TIMES: usize = 64;
+const LEAST_OF_SEVERAL: usize = 8;
 
 /// The side of a spectrum, `(..., n, n)` readings or `(..., n, n, 2)` pairs: the side that the user states, or a side
 /// of whose square no measurement of n patterns is a full sweep. One of (n, n) by its index is no spectrum.

@@ -285,7 +285,7 @@ fn a_useless_reconstruction_is_a_note_not_an_error() {
 
 #[test]
 fn what_is_no_measurement_file_is_named_for_what_it_is() {
-    let cases: [(&[u8], &str); 12] = [
+    let cases: [(&[u8], &str); 14] = [
         (b"", "found an empty file, expected measurements: .npz, .npy, .mat"),
         (b"\x00\x01\x02\x03", "found a file of another kind, expected measurements"),
         (
@@ -299,6 +299,8 @@ fn what_is_no_measurement_file_is_named_for_what_it_is() {
         (b"\x0f\x0f:WFM#003", "found a waveform file of Tektronix (.wfm; save it as CSV)"),
         (b"RIFF\x24\0\0\0WAVEfmt ", "found a WAV file that ends before its samples do"),
         (b"\x80\x04\x95\0", "found a pickle of Python (save its array with NumPy)"),
+        (b"(lp0\nF1.5\naF2.5\na.", "found a pickle of Python (save its array with NumPy)"),
+        (b"{\"y\": [1.5, 2.5]}", "found a JSON text (save its numbers as CSV)"),
         (b"\x1f\x8b\x08\0", "found a gzip file (unpack it)"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "found an old workbook of Excel (.xls"),
     ];
@@ -452,6 +454,9 @@ fn a_workbook_is_told_apart_from_an_archive_of_arrays() {
         let line = line(&read_bytes(&bytes, &as_is()).unwrap_err(), "lab.npz");
         assert!(line.contains(kind) && line.contains("save it as CSV"), "{line}");
     }
+    let bytes = zip(Zip::Stored, &[("y\n.csv", b"1".to_vec())]);
+    let line = line(&read_bytes(&bytes, &as_is()).unwrap_err(), "lab.npz");
+    assert!(line.contains("a zip archive without arrays, with \"y\\n.csv\" in it"), "{line}");
 }
 
 #[test]

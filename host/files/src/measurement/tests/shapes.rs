@@ -218,3 +218,30 @@ fn fields_of_other_names_are_named() {
     let found = read(&path, &want).unwrap();
     assert_eq!(found.readings, Readings::Pairs(vec![5.0, 1.0, 2.0, 3.0, 4.0, 4.0, 6.0, 0.5]));
 }
+
+#[test]
+fn readings_that_are_no_full_sweep_are_refused_with_what_they_may_be() {
+    let natural = shown(Order::Natural);
+    for (shape, said) in [
+        (
+            "(1536,)",
+            "3 sweeps of 16 x 16 patterns are read with --sweeps 3, 3 samples of each reading",
+        ),
+        ("(512, 20)", "add --patterns-first, or, if its last axis has samples of one reading"),
+        (
+            "(16, 16)",
+            "a spectrum of 16 x 16 is read with --side 16 and --readings differences or single",
+        ),
+        ("(256,)", "one value a pattern is read with --readings single or --readings differences"),
+        ("(30,)", "a full sweep of n * n patterns, n a power of two, or --side N"),
+    ] {
+        let count: usize = shape
+            .trim_matches(['(', ')'])
+            .split(',')
+            .filter_map(|axis| axis.trim().parse::<usize>().ok())
+            .product();
+        let (_folder, path) = file("y.npy", &npy_f64(shape, &vec![1.0; count]));
+        let line = line(&read(&path, &natural).unwrap_err(), "y.npy");
+        assert!(line.contains(said), "{shape}: {line}");
+    }
+}
