@@ -539,9 +539,12 @@ fn drift_words(lamp: Lamp, claim: Claim) -> Option<String> {
 #[must_use]
 pub fn overload_words(readings: &[usize]) -> Option<String> {
     let first = readings.first()?;
-    let are = if readings.len() == 1 { "is" } else { "are" };
+    let (say, from, patterns) = match readings.len() {
+        1 => ("says", format!("y[{first}]"), "the pattern is"),
+        _ => ("say", format!("from y[{first}] on"), "the patterns are"),
+    };
     Some(format!(
-        "overload: {} {are} 9.9e37, an instrument's word for overload, from y[{first}] on; the patterns are left out",
+        "overload: {} {say} that the detector was overloaded (9.9e37, OL or ∞), {from}; {patterns} left out",
         count_of(readings.len(), "reading")
     ))
 }

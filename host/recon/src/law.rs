@@ -132,7 +132,7 @@ pub fn read_at(
     let field = if claim.form == Form::Differences { "d" } else { "y" };
     expect_length(field, y.len(), rows.len() * claim.form.readings())?;
     expect_finite(field, y)?;
-    if let Some(doubt) = all_equal(y) {
+    if let Some(doubt) = all_equal(y, claim.form) {
         let measurements = match claim.form {
             Form::Pairs | Form::Halves => pairs::differences(rows, y.as_chunks::<2>().0, |_| true)?,
             Form::Single => Measurements::from_single(rows, y)?,
@@ -162,10 +162,11 @@ impl Measurements {
 /// Fewest readings of which it says something that all are equal.
 const FEWEST_EQUAL: usize = 8;
 
-fn all_equal(y: &[f64]) -> Option<Doubt> {
+fn all_equal(y: &[f64], form: Form) -> Option<Doubt> {
     let (first, others) = y.split_first()?;
     // Differences of nothing are an even, dark scene.
-    let equal = *first != 0.0 && others.iter().all(|value| value == first);
+    let says = *first != 0.0 || form != Form::Differences;
+    let equal = says && others.iter().all(|value| value == first);
     (equal && y.len() >= FEWEST_EQUAL)
         .then_some(Doubt::AllEqual { readings: y.len(), value: *first })
 }

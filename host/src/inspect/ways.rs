@@ -9,6 +9,7 @@ use crate::files::trace::Cut;
 use nirspi_recon::law::Explanation;
 use nirspi_recon::{Order, Rows, Side};
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// The most fields of which two are tried as patterns and complements.
@@ -83,6 +84,9 @@ impl<'t> Trials<'t> {
         let fitting = self.guesses.iter().filter(|guess| guess.fits());
         let most = fitting.map(|guess| guess.readings).max().unwrap_or(0);
         self.guesses.sort_by_key(|guess| guess.rank(most));
+        // A file that states its form is read so with and without the option.
+        let mut before = HashSet::new();
+        self.guesses.retain(|guess| before.insert(guess.commands.clone()));
         (self.tried, self.guesses)
     }
 
@@ -257,6 +261,13 @@ impl<'t> Trials<'t> {
                     self.of_trace(&trace);
                 }
                 self.repeats(format!("each reading is there {each} times"));
+                return;
+            }
+            Explanation::Repeats { each } => {
+                // No option reads them, so no other way is right either.
+                self.repeated = Some(format!(
+                    "each pattern and its complement are there {each} times in a row: save them with `h_row`, each row {each} times"
+                ));
                 return;
             }
             _ => return,

@@ -42,12 +42,14 @@ impl ArrayReport {
     }
 }
 
-/// A number with five digits.
+/// A number with five digits; a very large or small one with a power of ten.
 fn short(value: f64) -> String {
     let plain = format!("{value}");
+    let rounded = format!("{value:.4e}").parse::<f64>().unwrap_or(value);
     match plain.len() {
         0..=7 => plain,
-        _ => format!("{}", format!("{value:.4e}").parse::<f64>().unwrap_or(value)),
+        _ if rounded != 0.0 && !(1e-4..1e10).contains(&rounded.abs()) => format!("{rounded:e}"),
+        _ => format!("{rounded}"),
     }
 }
 

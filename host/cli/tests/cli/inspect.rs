@@ -170,6 +170,28 @@ fn what_is_in_the_file_is_said_with_the_best_ways_and_their_picture() {
     assert_eq!(report["provenance"]["file"], "log.csv");
 }
 
+/// A recorded feed states its form, so the form is no other way to read it. Large numbers are short.
+#[test]
+fn a_way_is_told_once_and_numbers_are_short() {
+    let (bench, scene) = (Bench::new(), Natural::new());
+    let mut y = scene.y.clone();
+    y[70] = 9.9e37;
+    let text: Vec<String> = y.iter().chain(&scene.y).map(|y| y.to_string()).collect();
+    let header = r#"{"n": 16, "order": "natural", "readings": "pairs"}"#;
+    bench.write("feed.txt", format!("{header}\n{}\n", text.join(" ")).as_bytes());
+    let capture = ["capture", "--camera", "feed:feed.txt", "--frames", "2", "--out", "rec.npz"];
+    bench.run(&capture);
+    let report = bench.run(&["inspect", "rec.npz", "--json"]).succeeded().json();
+    let guesses = report["guesses"].as_array().unwrap();
+    let commands: Vec<&serde_json::Value> =
+        guesses.iter().map(|guess| &guess["commands"]).collect();
+    let other = (1..commands.len()).find(|&at| commands[..at].contains(&commands[at]));
+    assert!(!commands.is_empty() && other.is_none(), "{commands:?}");
+    bench.write("y.npy", &encode(&[512], &y));
+    let said = bench.run(&["inspect", "y.npy"]).succeeded().stdout;
+    assert!(said.contains(" to 9.9e37\n"), "{said}");
+}
+
 #[test]
 fn patterns_traces_and_recordings_are_named_for_what_they_are() {
     let (bench, scene) = (Bench::new(), Natural::new());

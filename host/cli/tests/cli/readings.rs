@@ -97,6 +97,37 @@ fn readings_without_the_first_one_are_shifted_by_an_option() {
     assert!(alike > 0.99, "{alike}");
 }
 
+/// Pairs that come several times in a row keep the law of light, and look like those of a larger image.
+#[test]
+fn patterns_that_were_shown_several_times_in_a_row_are_told_and_need_their_rows() {
+    let bench = Bench::new();
+    let four = |y: &[f32]| -> Vec<f32> {
+        y.as_chunks::<2>().0.iter().flat_map(|pair| [*pair; 4]).flatten().collect()
+    };
+    let measured = phantom(&bench, |y| four(&y));
+    let (lines, _) = said(&bench, &[]);
+    let words = "each pattern and its complement 4 times in a row: save them with `h_row`, each row 4 times";
+    assert!(lines.contains(words), "{lines}");
+    // Who says the side has readings of one larger image.
+    let (lines, _) = said(&bench, &["--side", "32"]);
+    assert!(!lines.contains("warning"), "{lines}");
+    let inspected = bench.run(&["inspect", "in.npy"]).succeeded().stdout;
+    assert!(
+        inspected.contains("none fits") && inspected.contains("4 times in a row"),
+        "{inspected}"
+    );
+    let rows: Vec<f32> = (0..1024).map(|at| (at / 4) as f32).collect();
+    let y = four(&measured.natural());
+    bench.write(
+        "rows.npz",
+        &npz(&[("n", &[], &[16.0]), ("h_row", &[1024], &rows), ("y", &[2048], &y)]),
+    );
+    let lines = bench.run(&["reconstruct", "rows.npz", "--out", "rows"]).succeeded().stdout;
+    assert!(lines.contains("each pattern was shown 4 times: the mean of its readings is used"));
+    let alike = correlation(&bench.pixels("rows/image.npy"), &measured.image);
+    assert!(alike > 0.99, "{alike}");
+}
+
 #[test]
 fn words_of_a_converter_for_no_reading_are_drop_outs() {
     let bench = Bench::new();
@@ -207,7 +238,9 @@ fn an_instruments_word_for_overload_is_no_reading() {
     let (lines, report) = said(&bench, &[]);
     assert_eq!(report["not_read"], serde_json::json!([20, 150]), "{lines}");
     assert!(
-        report["warnings"][0].as_str().unwrap().starts_with("overload: 2 readings are 9.9e37"),
+        report["warnings"][0].as_str().unwrap().starts_with(
+            "overload: 2 readings say that the detector was overloaded (9.9e37, OL or ∞), from y[40] on"
+        ),
         "{lines}"
     );
     assert!(correlation(&bench.pixels("out/image.npy"), &measured.image) > 0.99);

@@ -33,6 +33,11 @@ pub enum Explanation {
         /// Number of samples of a reading.
         each: usize,
     },
+    /// Each pattern and its complement came several times in a row.
+    Repeats {
+        /// Number of times.
+        each: usize,
+    },
     /// Several sweeps came one after another.
     Sweeps {
         /// Number of sweeps.
@@ -232,6 +237,10 @@ impl fmt::Display for Because {
             Explanation::Samples { each } => write!(
                 f,
                 "the readings fit {each} samples of each reading: nirspi readings --samples {each} averages them"
+            ),
+            Explanation::Repeats { each } => write!(
+                f,
+                "the readings fit each pattern and its complement {each} times in a row: save them with `h_row`, each row {each} times; if this is one sweep of a larger image, say so with --side"
             ),
             Explanation::Sweeps { count } => write!(
                 f,

@@ -4,12 +4,14 @@
 //! all-on pattern says the same, if it is shown again and again.
 
 use super::Form;
-use super::robust::{deviation, median};
+use super::robust::{deviation, median, running_median};
 
 /// The least error of a drift, as a share of the differences, that is told.
 const LEAST: f64 = 0.01;
 /// Fewest pairs that say how steady a lamp is.
 const FEWEST: usize = 16;
+/// Window of a running median that follows the steps of a lamp.
+const STEPPED: usize = 63;
 /// Fewest all-on readings that do.
 const FEWEST_ALL_ON: usize = 4;
 
@@ -51,8 +53,13 @@ impl Lamp {
         if middle <= 0.0 {
             return None;
         }
-        let off = |k: usize| (pairs[k][0] + pairs[k][1] - level[k]).abs();
-        let noise = deviation(whole.iter().map(|&k| off(k)));
+        let sums: Vec<f64> = whole.iter().map(|&k| pairs[k][0] + pairs[k][1]).collect();
+        // The level has no steps. A running median has them, and no slope at the ends.
+        let stepped = running_median(&sums, STEPPED);
+        let off = |by: &dyn Fn(usize) -> f64| {
+            deviation(sums.iter().enumerate().map(|(at, sum)| (sum - by(at)).abs()))
+        };
+        let noise = off(&|at| level[whole[at]]).min(off(&|at| stepped[at]));
         // Light that noise hides says nothing of its lamp.
         if noise >= middle {
             return None;

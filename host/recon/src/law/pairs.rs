@@ -285,6 +285,14 @@ fn other_form(
         let explanation = Explanation::Sweeps { count: sweeps };
         return Some(Doubt::Repeated { readings: recorded.len(), explanation });
     }
+    let differences: Vec<f64> =
+        Places::filled(places, pairs).iter().map(|[one, other]| one - other).collect();
+    if claim.side_guessed
+        && let Some(each) = repeats::samples(&differences, true)
+    {
+        let explanation = Explanation::Repeats { each };
+        return Some(Doubt::Repeated { readings: recorded.len(), explanation });
+    }
     let rearranged: Vec<[f64; 2]> = match claim.form {
         Form::Halves => recorded.as_chunks::<2>().0.to_vec(),
         _ => (0..count).map(|k| [recorded[k], recorded[count + k]]).collect(),

@@ -210,6 +210,11 @@ fn a_lamp_that_drifts_is_told_where_it_limits_and_sums_correct_it() {
     let (lamp, as_it_is, divided) = under_a_lamp(drifts, 0.0, 1e-4);
     assert!(lamp.limits && (lamp.drift - 0.3 / 1.15).abs() < 0.02, "{lamp:?}");
     assert!(divided < 0.2 * as_it_is, "{divided} {as_it_is}");
+    // Steps are a drift, and no noise.
+    let steps = |k: f64| if ((k / 150.0) as u32).is_multiple_of(2) { 1.0 } else { 0.7 };
+    let (lamp, as_it_is, divided) = under_a_lamp(steps, 0.0, 1e-4);
+    assert!(lamp.limits && lamp.drift > 0.3 && lamp.spread < 0.001, "{lamp:?}");
+    assert!(divided < 0.2 * as_it_is, "{divided} {as_it_is}");
     // Flicker from pair to pair is no drift, and the sums correct it, too.
     let flickers = |k: f64| 1.0 + 0.05 * (k * 2.1).sin();
     let (lamp, as_it_is, divided) = under_a_lamp(flickers, 0.0, 1e-4);
@@ -386,6 +391,17 @@ fn several_samples_and_several_sweeps_are_counted() {
                     (0..times * y.len()).map(|k| y[k % y.len()] * wobble(k)).collect();
                 let found = explanation(&larger, &sweeps, claim(form));
                 assert_eq!(found, Some(Explanation::Sweeps { count: times }), "{name}, {form:?}");
+                if form == Form::Pairs {
+                    let shown = |k: usize| y[2 * (k / 2 / times) + k % 2] * wobble(k);
+                    let pairs: Vec<f64> = (0..times * y.len()).map(shown).collect();
+                    for form in [Form::Pairs, Form::Halves] {
+                        let found = explanation(&larger, &pairs, claim(form));
+                        let each = Some(Explanation::Repeats { each: times });
+                        assert_eq!(found, each, "{name}, {form:?}");
+                        let found = explanation(&larger, &pairs, form.into());
+                        assert!(!matches!(found, Some(Explanation::Repeats { .. })), "{name}");
+                    }
+                }
                 // Who says the side has one sweep.
                 let found = explanation(&larger, &sweeps, form.into());
                 assert!(!matches!(found, Some(Explanation::Sweeps { .. })), "{name}: {found:?}");
@@ -506,14 +522,16 @@ fn saturation_is_named_for_what_it_is() {
 #[test]
 fn all_readings_alike_are_no_picture() {
     let rows = Rows::natural(side(4));
-    for (form, y) in in_every_form(&[4095.0; 32]) {
-        let found = read(&rows, &y, form.into()).unwrap();
-        match form {
-            // Pairs without a difference are a dark scene.
-            Form::Differences => assert_eq!(found.doubts, []),
-            _ => assert_eq!(found.doubts, [Doubt::AllEqual { readings: y.len(), value: 4095.0 }]),
+    for value in [4095.0, 0.0] {
+        for (form, y) in in_every_form(&[value; 32]) {
+            let found = read(&rows, &y, form.into()).unwrap();
+            match form {
+                // Pairs without a difference are a dark scene.
+                Form::Differences => assert_eq!(found.doubts, []),
+                _ => assert_eq!(found.doubts, [Doubt::AllEqual { readings: y.len(), value }]),
+            }
+            assert_eq!(found.measurements.rows().len(), 16);
         }
-        assert_eq!(found.measurements.rows().len(), 16);
     }
 }
 
