@@ -117,3 +117,11 @@ pub(super) fn line(error: &super::FileError, name: &str) -> String {
     assert!(line.contains(name), "{line:?}");
     line
 }
+
+/// Noise from -1/2 to 1/2, the same at the same place (splitmix64).
+pub fn noise(at: usize) -> f64 {
+    let mut z = (at as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+}

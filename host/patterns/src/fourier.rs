@@ -47,6 +47,9 @@ pub struct Spectrum {
     pub values: Vec<Option<Complex>>,
 }
 
+/// Fewest numbers that tell a noise: to a quarter.
+const LEAST_TWINS: usize = 8;
+
 /// A row of the matrix: a cosine, or a sine downwards, of a frequency.
 #[derive(Debug, Clone)]
 pub struct Row {
@@ -90,6 +93,27 @@ impl Spectrum {
         };
         self.values = (0..values.len()).map(|at| values[from(at)]).collect();
         Some("the zero frequency is in the middle of the spectrum".to_owned())
+    }
+
+    /// Standard deviation of the noise of a value of [`rows`](Self::rows), by opposite frequencies that were both read: but for
+    /// noise, their coefficients are conjugate. `None` for too few.
+    #[must_use]
+    pub fn noise(&self) -> Option<f64> {
+        let (height, width) = (self.size.height(), self.size.width());
+        let read = |v: usize, u: usize| self.values.get(v * self.columns + u).copied().flatten();
+        let (mut squares, mut count) = (0.0, 0);
+        for (v, u) in (0..height).flat_map(|v| (0..self.columns).map(move |u| (v, u))) {
+            let opposite = ((height - v) % height, (width - u) % width);
+            if (v, u) < opposite
+                && opposite.1 < self.columns
+                && let (Some(one), Some(other)) = (read(v, u), read(opposite.0, opposite.1))
+            {
+                squares += (one.0 - other.0).powi(2) + (one.1 + other.1).powi(2);
+                count += 2;
+            }
+        }
+        // A difference has the noise of both.
+        (count >= LEAST_TWINS).then(|| (squares / (2 * count) as f64).sqrt())
     }
 
     /// The rows of all coefficients that were read, and their values, all with the same noise.

@@ -497,7 +497,8 @@ fn of_matrix(
             next += 1;
         }
         let (some, sigma) = (&all[first..next], of_some.map(|known| known.sigma));
-        let settings = &MatrixSettings { noise: sigma, ..settings.clone() };
+        let most_noise = (first..next).map(|index| noise.of(index)[1]).collect();
+        let settings = &MatrixSettings { noise: sigma, most_noise, ..settings.clone() };
         if stop.load(Ordering::Relaxed) {
             return Err(stopped());
         }

@@ -100,7 +100,12 @@ impl Ready {
         let strength = settings.strength.map_or_else(Strength::default, Strength::Fixed);
         let base = MethodSettings { strength, ..base.clone() };
         let of_method = method.matrix_settings(&base)?;
-        let of_method = MatrixSettings { dark: plain.dark, noise: plain.noise, ..of_method };
+        let of_method = MatrixSettings {
+            dark: plain.dark,
+            noise: plain.noise,
+            most_noise: vec![plain.most_noise],
+            ..of_method
+        };
         let own = OwnMatrix::new(plain.patterns.size, &plain.patterns.select(&plain.places))?;
         Ok(Self {
             patterns: Arc::clone(&plain.patterns),
@@ -150,6 +155,7 @@ mod tests {
             not_read: Vec::new(),
             taken: Taken::simulated_or(None),
             noise: None,
+            most_noise: None,
             notes: Vec::new(),
             dark: true,
         };

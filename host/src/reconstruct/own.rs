@@ -263,7 +263,9 @@ fn same(
         (Some(sigma), true) => Some(KnownNoise { sigma, from: NoiseFrom::Stated }),
         (None, true) => own.known_noise(&readings),
     };
-    let settings = &MatrixSettings { noise: known.map(|known| known.sigma), ..settings.clone() };
+    let most_noise = all.iter().map(|&at| plain[at].most_noise).collect();
+    let noise = known.map(|known| known.sigma);
+    let settings = &MatrixSettings { noise, most_noise, ..settings.clone() };
     let solve = || own.reconstruct_all(&readings, settings);
     let found = times.time("reconstruct", solve).map_err(refused)?;
     let basis = match request.dictionary {

@@ -1,5 +1,6 @@
-//! What a file says of the noise of its differences.
+//! What a file says of the noise of its differences, and what its pairs say.
 
+use super::opened::is_reading;
 use crate::fields::Fields;
 
 /// The field with the standard deviation of the noise of `d`, if it is known.
@@ -32,4 +33,26 @@ impl Deviations {
         let value = *self.0.get(index).or(self.0.first())?;
         (value.is_finite() && value >= 0.0).then_some(value)
     }
+}
+
+/// Fewest sums that tell a noise.
+const LEAST_PAIRS: usize = 16;
+
+/// Share of the changes of sums that are smaller than the one that tells the noise, and that change for noise of 1: a lamp that
+/// steps changes few sums.
+const QUANTILE: (f64, f64) = (0.75, 1.150_35);
+
+/// What the noise of a difference is at most, by the sums of pairs: these see the light of the whole scene, with the same
+/// noise. `None` for too few pairs.
+pub(super) fn noise_of_pairs(pairs: &[[f64; 2]]) -> Option<f64> {
+    let sums: Vec<f64> =
+        pairs.iter().map(|[on, off]| on + off).filter(|&sum| is_reading(sum)).collect();
+    let mut changes: Vec<f64> = sums.windows(2).map(|two| (two[1] - two[0]).abs()).collect();
+    if sums.len() < LEAST_PAIRS {
+        return None;
+    }
+    let (share, expected) = QUANTILE;
+    let at = (share * changes.len() as f64) as usize;
+    let change = *changes.select_nth_unstable_by(at, f64::total_cmp).1;
+    Some(change / expected / std::f64::consts::SQRT_2)
 }

@@ -4,7 +4,7 @@ use super::axes::joined;
 use super::called::called;
 use super::layout::Layout;
 use super::named::{NamedPatterns, read_fourier};
-use super::noise::{Deviations, NOISE};
+use super::noise::{Deviations, MOST_NOISE, NOISE, noise_of_pairs};
 use super::opened::{is_reading, stated_form};
 use super::patterns::{PatternArray, PatternSelection, Patterns};
 use super::readings::{Hint, NamedReadings, check_infinite, expected_of, readings_field};
@@ -157,8 +157,8 @@ impl PlainSweeps {
 struct Numbers {
     /// Of each measurement: at least one.
     all: Vec<Vec<f64>>,
-    /// What the file says of the noise of each.
-    noise: Vec<Option<f64>>,
+    /// What the file says of the noise of each, and what that noise is at most.
+    noise: Vec<[Option<f64>; 2]>,
     form: Form,
     taken: Taken,
     notes: Vec<String>,
@@ -175,12 +175,13 @@ fn weighing(patterns: Patterns, form: Form) -> Arc<Patterns> {
 impl Numbers {
     fn plain(self, patterns: &Arc<Patterns>) -> Vec<Plain> {
         let Self { all, noise, taken, notes, .. } = self;
-        let plain = |(all, noise): (Vec<f64>, Option<f64>)| {
+        let plain = |(all, [noise, most_noise]): (Vec<f64>, [Option<f64>; 2])| {
             let (places, not_read): (Vec<usize>, Vec<usize>) =
                 (0..all.len()).partition(|&k| is_reading(all[k]));
             let values = places.iter().map(|&k| all[k]).collect();
             let (patterns, taken, notes) = (Arc::clone(patterns), taken.clone(), notes.clone());
-            Plain { patterns, values, places, not_read, taken, noise, notes, dark: true }
+            let dark = true;
+            Plain { patterns, values, places, not_read, taken, noise, most_noise, notes, dark }
         };
         all.into_iter().zip(noise).map(plain).collect()
     }
@@ -227,10 +228,12 @@ fn numbers_of(
     }
     let mut readings = NamedReadings::open(&mut fields, name, want, &expected)?;
     let layout = readings.layout;
-    let noise = match readings.name == "d" {
-        true => Deviations::read(&mut fields, NOISE, layout.count),
+    let is_d = readings.name == "d";
+    let mut said = |name| match is_d {
+        true => Deviations::read(&mut fields, name, layout.count),
         false => Deviations::default(),
     };
+    let said = [said(NOISE), said(MOST_NOISE)];
     let numbers = readings.numbers(&mut fields)?;
     let refused =
         |found: &str, expected| FileError::field(path, readings.name.clone(), found, expected);
@@ -249,19 +252,21 @@ fn numbers_of(
             true => pattern - complement,
             false => f64::NAN,
         };
-    let noise = indices.clone().map(|index| noise.of(index)).collect();
+    let mut noise: Vec<[Option<f64>; 2]> = Vec::with_capacity(indices.len());
     let mut all = Vec::with_capacity(indices.len());
     for index in indices {
         let values = layout.series(&numbers.real, index);
         check_infinite(path, &readings.name, &values)?;
+        let pairs: Vec<[f64; 2]> = match form {
+            Form::Single | Form::Differences => Vec::new(),
+            Form::Pairs => values.as_chunks().0.to_vec(),
+            Form::Halves => (0..patterns).map(|k| [values[k], values[patterns + k]]).collect(),
+        };
+        let [stated, most] = said.each_ref().map(|said| said.of(index));
+        noise.push([stated, most.or_else(|| noise_of_pairs(&pairs))]);
         let values: Vec<f64> = match form {
             Form::Single | Form::Differences => values,
-            Form::Pairs => {
-                values.as_chunks().0.iter().map(|&[on, off]| difference(on, off)).collect()
-            }
-            Form::Halves => {
-                (0..patterns).map(|k| difference(values[k], values[patterns + k])).collect()
-            }
+            _ => pairs.iter().map(|&[on, off]| difference(on, off)).collect(),
         };
         if !values.iter().copied().any(is_reading) {
             let place =
@@ -293,7 +298,37 @@ fn form_of(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{Zip, file, npy_f64, zip};
+    use crate::testing::{Zip, file, noise, npy_f64, zip};
+
+    /// Pairs of pattern and complement see the same light, so their sums tell what the noise is at most.
+    #[test]
+    fn sums_of_pairs_say_what_the_noise_is_at_most() {
+        let weights: Vec<f64> = (0..200 * 4).map(|at| f64::from(at % 3)).collect();
+        let (_kept, matrix) = file("matrix.npy", &npy_f64("(200, 4)", &weights));
+        // A lamp that steps once.
+        let light = |at: usize| if at < 150 { 9.0 } else { 8.0 };
+        let on = |at: usize| 3.0 + (at % 7) as f64 / 4.0;
+        let pairs = |size: f64| -> Vec<f64> {
+            let of = |at| [on(at) + size * noise(at), light(at) - on(at)];
+            (0..200).flat_map(of).collect()
+        };
+        let most = |form: Form, y: &[f64]| {
+            let shape = format!("({},)", y.len());
+            let (_folder, path) = file("y.npy", &npy_f64(&shape, y));
+            let want = Selection { form: Some(form), ..Selection::default() };
+            read_plain(&matrix, &PatternSelection::default(), &path, &want).unwrap().most_noise
+        };
+        for size in [0.0, 0.1] {
+            let (y, expected) = (pairs(size), size / 12.0_f64.sqrt());
+            let parts = [0, 1].map(|which| y.iter().skip(which).step_by(2).copied());
+            let halves: Vec<f64> = parts.into_iter().flatten().collect();
+            for found in [most(Form::Pairs, &y), most(Form::Halves, &halves)] {
+                let off = found.unwrap() - expected;
+                assert!(off.abs() < 1e-9 + 0.3 * expected, "{size}: {found:?}");
+            }
+        }
+        assert_eq!(most(Form::Single, &vec![1.0; 200]), None);
+    }
 
     #[test]
     fn a_sweep_of_own_patterns_is_read_as_a_file_with_its_readings_is() {

@@ -19,6 +19,8 @@ pub struct Plain {
     pub taken: Taken,
     /// Standard deviation of the noise of a value, if the file says so.
     pub noise: Option<f64>,
+    /// What that noise is at most, if more than the values says so: the sums of pairs, or the steps of Fourier patterns.
+    pub most_noise: Option<f64>,
     /// What people may not expect, one line each.
     pub notes: Vec<String>,
     /// Whether the values may hold a constant dark level.

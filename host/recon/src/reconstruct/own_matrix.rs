@@ -106,6 +106,9 @@ pub struct MatrixSettings {
     /// Standard deviation of the noise of a measurement, if it is [known](OwnMatrix::known_noise). Tikhonov's strength is then
     /// the one at which the measurements are most likely.
     pub noise: Option<f64>,
+    /// What that noise is at most, for each of the measurements, where it is not known and more than the measurement says so.
+    /// Only complete sets of orthogonal patterns need it: other measurements predict each other.
+    pub most_noise: Vec<Option<f64>>,
 }
 
 impl MatrixSettings {
@@ -122,6 +125,7 @@ impl MatrixSettings {
             non_negative: false,
             dark: true,
             noise: None,
+            most_noise: Vec::new(),
         }
     }
 }

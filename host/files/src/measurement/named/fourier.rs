@@ -61,9 +61,13 @@ pub(in crate::measurement) fn read_fourier(
     };
     let mut found: Vec<Plain> = Vec::with_capacity(fields.len());
     for field in fields {
-        let mut spectrum = spectrum(field).map_err(|(found, expected)| refused(found, expected))?;
+        let (mut spectrum, of_steps) =
+            spectrum(field).map_err(|(found, expected)| refused(found, expected))?;
         let mut notes = notes.clone();
         notes.extend(spectrum.center());
+        // Of a spectrum, half may be a copy of the other half.
+        let of_opposites = || spectrum.noise().filter(|noise| !is_spectrum || *noise > 0.0);
+        let most_noise = of_steps.or_else(of_opposites);
         let not_read: Vec<usize> =
             (0..spectrum.values.len()).filter(|&at| spectrum.values[at].is_none()).collect();
         let (size, area) = (spectrum.size, spectrum.size.area());
@@ -93,7 +97,17 @@ pub(in crate::measurement) fn read_fourier(
         });
         let places = (0..values.len()).collect();
         let (taken, noise, dark) = (taken.clone(), None, false);
-        found.push(Plain { patterns, values, places, not_read, taken, noise, notes, dark });
+        found.push(Plain {
+            patterns,
+            values,
+            places,
+            not_read,
+            taken,
+            noise,
+            most_noise,
+            notes,
+            dark,
+        });
     }
     Ok(found)
 }
@@ -163,8 +177,11 @@ fn refusal(shape: &[usize], steps: Option<usize>) -> (String, String) {
     (found, expected)
 }
 
+/// A spectrum, and the noise of its rows by the steps of each frequency.
+type Seen = (Spectrum, Option<f64>);
+
 /// The spectrum that a file holds.
-fn of_complex(field: Field, size: Option<Size>) -> Result<Spectrum, (String, String)> {
+fn of_complex(field: Field, size: Option<Size>) -> Result<Seen, (String, String)> {
     let shape: Vec<usize> = field.shape.iter().copied().filter(|&axis| axis != 1).collect();
     let two = match shape[..] {
         [height, width] => Some((height, width)),
@@ -176,12 +193,27 @@ fn of_complex(field: Field, size: Option<Size>) -> Result<Spectrum, (String, Str
     let value = |(&real, &imaginary): (&f64, &f64)| {
         (is_reading(real) && is_reading(imaginary)).then_some((real, imaginary))
     };
-    let values = field.real.iter().zip(&imaginary).map(value).collect();
-    Ok(Spectrum { size, columns, values })
+    let values: Vec<Option<Complex>> = field.real.iter().zip(&imaginary).map(value).collect();
+    Ok((Spectrum { size, columns, values }, None))
 }
 
+/// The noise of a coefficient's part by four steps of its frequency, of which two opposite ones have the same sum as the other
+/// two, without noise.
+fn noise_of_steps(of: impl Iterator<Item = [f64; 4]>) -> Option<f64> {
+    let misses: Vec<f64> = of
+        .filter(|steps| steps.iter().copied().all(is_reading))
+        .map(|[one, two, three, four]| (one + three - two - four).powi(2))
+        .collect();
+    // Four readings miss, two make a part.
+    let variance = misses.iter().sum::<f64>() / (2 * misses.len()) as f64;
+    (misses.len() >= LEAST_STEPS).then(|| variance.sqrt())
+}
+
+/// Fewest frequencies whose steps tell a noise: to a quarter.
+const LEAST_STEPS: usize = 8;
+
 /// The coefficients of readings in steps: a last axis of the steps, a first axis, or one after another.
-fn of_steps(field: &Field, steps: usize, size: Option<Size>) -> Result<Spectrum, (String, String)> {
+fn of_steps(field: &Field, steps: usize, size: Option<Size>) -> Result<Seen, (String, String)> {
     let shape: Vec<usize> = field.shape.iter().copied().filter(|&axis| axis != 1).collect();
     let refused = || refusal(&field.shape, Some(steps));
     let (is_first, rest) = match shape[..] {
@@ -211,5 +243,12 @@ fn of_steps(field: &Field, steps: usize, size: Option<Size>) -> Result<Spectrum,
             }
         }
     };
-    Ok(Spectrum { size, columns, values: (0..frequencies).map(value).collect() })
+    let spectrum = Spectrum { size, columns, values: (0..frequencies).map(value).collect() };
+    let most_noise = match steps {
+        4 => noise_of_steps(
+            (0..frequencies).map(|frequency| [0, 1, 2, 3].map(|step| at(frequency, step))),
+        ),
+        _ => None,
+    };
+    Ok((spectrum, most_noise))
 }

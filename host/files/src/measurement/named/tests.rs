@@ -1,7 +1,7 @@
 use super::*;
 use crate::measurement::{PatternSelection, Selection};
 use crate::measurement::{Plain, read_plain};
-use crate::testing::{Zip, file, npy_f64, zip};
+use crate::testing::{Zip, file, noise, npy, npy_f64, zip};
 use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, OwnMatrix};
 use std::f64::consts::TAU;
 
@@ -185,4 +185,50 @@ fn what_is_no_set_or_does_not_fit_is_refused_in_one_line() {
     let other = told("fourier:4", "(65,)", 65, None);
     assert!(other.contains("has shape (65), expected (height, width, 4)"), "{other}");
     assert!(told("fourier:4", "(64,)", 64, Some(size(8, 8))).contains("has shape (64)"));
+}
+
+/// Readings that were taken several times tell the noise of a row: steps of a frequency, and frequencies that are opposite.
+#[test]
+fn steps_and_opposite_frequencies_tell_the_noise() {
+    let size = size(12, 14);
+    // That of numbers between -1/2 and 1/2.
+    let spread = 1.0_f64 / 12.0;
+    for steps in [3, 4] {
+        let patterns = NamedPatterns::Fourier { steps }.patterns(Some(size)).unwrap();
+        let clear = see(&patterns, &scene(size), 5.0);
+        let noise_of = |y: &[f64], shape: &str| {
+            let set = format!("fourier:{steps}");
+            read(&set, shape, y, Some(size), &Selection::default()).unwrap().most_noise
+        };
+        let whole = format!("(12, 14, {steps})");
+        assert!(noise_of(&clear, &whole).is_some_and(|noise| noise < 1e-9));
+        let y: Vec<f64> = clear.iter().enumerate().map(|(at, y)| y + noise(at)).collect();
+        let found = noise_of(&y, &whole).unwrap();
+        // A part is the difference of two readings, or of three the weighted sum.
+        let expected =
+            spread.sqrt() * if steps == 4 { 2.0_f64.sqrt() } else { (8.0_f64 / 3.0).sqrt() };
+        assert!((found / expected - 1.0).abs() < 0.2, "{steps}: {found}, {expected}");
+        // Half of the plane has opposite frequencies in its first and its last column.
+        let half: Vec<f64> =
+            (0..y.len()).filter(|at| at / steps % 14 < 8).map(|at| y[at]).collect();
+        let found = noise_of(&half, &format!("(12, 8, {steps})")).unwrap();
+        assert!((found / expected - 1.0).abs() < 0.5, "{steps}: {found}, {expected}");
+    }
+    // A complex spectrum of which one half is a copy, and one whose halves were measured.
+    let parts = |wobble: f64| -> Vec<u8> {
+        let of = |at: usize| {
+            let opposite = (12 - at / 14) % 12 * 14 + (14 - at % 14) % 14;
+            let (first, sign) = (at.min(opposite), if opposite < at { -1.0 } else { 1.0 });
+            let imaginary = if at == opposite { 0.0 } else { sign * (first % 7) as f64 };
+            [(first % 11) as f64 + wobble * noise(at), imaginary + wobble * noise(168 + at)]
+        };
+        (0..168).flat_map(of).flat_map(f64::to_le_bytes).collect()
+    };
+    for (wobble, is_known) in [(0.0, false), (0.1, true)] {
+        let bytes = npy("'<c16'", false, "(12, 14)", &parts(wobble));
+        let (_folder, path) = file("y.npy", &bytes);
+        let (of, want) = (PatternSelection::default(), Selection::default());
+        let found = read_plain(Path::new("fourier:4"), &of, &path, &want).unwrap();
+        assert_eq!(found.most_noise.is_some(), is_known, "{wobble}");
+    }
 }

@@ -7,7 +7,8 @@
 //! are most likely, if coefficients are normal with variance `s^2` and noise with `t`, both times a
 //! common factor (evidence, or restricted likelihood: H. D. Patterson and R. Thompson, *Biometrika*
 //! 58, 545, 1971). So the finest details, which scenes hardly have, tell the noise. Where the noise is known, it is the
-//! factor that is left.
+//! factor that is left. A scene with much fine detail looks like noise: readings that were taken several times, such as the
+//! sums of pairs, say what the noise is at most, and noise beyond that is detail.
 
 use super::problem::Fit;
 use super::{DarkLevel, MatrixMethod, MatrixSettings, OwnMatrix, Penalty, STRENGTHS};
@@ -20,11 +21,18 @@ const SAME: f64 = 1e-9;
 /// Part of a constant's energy outside the mean of the image below which a dark level is the mean.
 const SEEN: f64 = 1e-12;
 
+/// The least variance of a coefficient's noise, the greatest measurement being 1: that of rounding.
+const ROUNDING: f64 = 1e-20;
+
 /// Strengths between two neighbours of [`STRENGTHS`].
 const BETWEEN: u32 = 4;
 
-/// The image and its strength; `None` for other patterns or settings.
-pub(super) fn solve(own: &OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Option<(Fit, f64)> {
+/// The image of the measurement at this place of all, and its strength; `None` for other patterns or settings.
+pub(super) fn solve(
+    own: &OwnMatrix,
+    (at, y): (usize, &[f64]),
+    settings: &MatrixSettings,
+) -> Option<(Fit, f64)> {
     let energy = energy(own)?;
     let is_ours = settings.method == MatrixMethod::Penalty(Penalty::Tikhonov)
         && settings.atoms.is_none()
@@ -51,11 +59,22 @@ pub(super) fn solve(own: &OwnMatrix, y: &[f64], settings: &MatrixSettings) -> Op
     let outside: f64 = details.iter().map(|&j| constant[j].powi(2)).sum();
     let sees_dark = outside > SEEN * constant.iter().map(|v| v * v).sum::<f64>();
     let fits_dark = settings.dark && sees_dark;
-    let known = settings.noise.filter(|sigma| *sigma > 0.0);
-    let known = known.map(|sigma| (sigma / unit).powi(2) / energy);
-    let model = Model { found, constant, sizes, details, fits_dark, known };
+    let variance = |sigma: f64| (sigma / unit).powi(2) / energy;
+    let known = settings.noise.filter(|sigma| *sigma > 0.0).map(variance);
+    let mut model = Model { found, constant, sizes, details, fits_dark, known };
     let relative = model.details.iter().map(|&j| model.sizes[j]).sum::<f64>() / y.len() as f64;
-    let strength = settings.strength.unwrap_or_else(|| model.likeliest(relative));
+    let strength = settings.strength.unwrap_or_else(|| {
+        let likeliest = model.likeliest(relative);
+        let most = settings.most_noise.get(at).copied().flatten().filter(|_| known.is_none());
+        let most = most.map(|sigma| variance(sigma).max(ROUNDING));
+        match most.filter(|most| *most < model.variance(likeliest * relative)) {
+            None => likeliest,
+            most => {
+                model.known = most;
+                model.likeliest(relative)
+            }
+        }
+    });
 
     let noise = strength * relative;
     let dark = model.dark(noise);
@@ -118,6 +137,13 @@ impl Model {
             }
             false => 0.0,
         }
+    }
+
+    /// The likeliest variance of the noise, for this ratio of noise to the expected sizes.
+    fn variance(&self, noise: f64) -> f64 {
+        let dark = self.dark(noise);
+        let misfit = self.sum(noise, |j| (self.found[j] - dark * self.constant[j]).powi(2));
+        noise * misfit / self.details.len().max(1) as f64
     }
 
     /// The strength at which the coefficients are most likely. `relative` times a strength is the

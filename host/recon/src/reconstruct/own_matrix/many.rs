@@ -111,10 +111,10 @@ impl<'m> Many<'m> {
             return Ok(Vec::new());
         }
         let settings = MatrixSettings { method, ..self.settings.clone() };
-        let first = complete::solve(self.own, self.all[which[0]], &settings);
+        let solve = |&at: &usize| complete::solve(self.own, (at, self.all[at]), &settings);
+        let first = solve(&which[0]);
         let made: Vec<Made> = match method {
             _ if first.is_some() => {
-                let solve = |at: &usize| complete::solve(self.own, self.all[*at], &settings);
                 let found: Vec<_> = which.par_iter().filter_map(solve).collect();
                 let made = |(fit, strength)| Made { fit, strength: Some(strength), atoms: None };
                 found.into_iter().map(made).collect()

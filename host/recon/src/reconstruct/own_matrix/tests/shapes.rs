@@ -1,8 +1,8 @@
 //! Images that are no square, or squares without a Hadamard matrix.
 
 use super::{METHODS, patterns, seen};
-use crate::reconstruct::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix};
-use crate::testing::correlation_of;
+use crate::reconstruct::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
+use crate::testing::{correlation_of, side};
 use crate::{Basis, Image, Size};
 use nalgebra::DMatrix;
 
@@ -80,6 +80,43 @@ fn complete_orthogonal_sets_of_any_shape_are_inverted_in_one_step() {
     for (found, truth) in found.unwrap().image.pixels().iter().zip(&truth) {
         assert!((f64::from(*found) - truth).abs() < 1e-3, "{found} and {truth}");
     }
+}
+
+/// A complete set has the detail of the scene, and readings taken twice tell it from noise.
+#[test]
+fn fine_detail_of_a_complete_set_is_kept_where_the_noise_is_known_to_be_less() {
+    let sign = |at: usize| ((at / 256) & (at % 256)).count_ones().is_multiple_of(2);
+    let weights: Vec<f64> = (0..256 * 256).map(|at| if sign(at) { 1.0 } else { -1.0 }).collect();
+    let own = OwnMatrix::new(side(16), &weights).unwrap();
+    // Half of the pixels, in no order.
+    let truth: Vec<f64> =
+        (0..256_u32).map(|p| f64::from(p.wrapping_mul(2_654_435_761) >> 31)).collect();
+    for sigma in [0.0, 0.5] {
+        let y = seen(&weights, &truth, sigma);
+        let error = |most_noise| {
+            let most_noise = vec![most_noise];
+            let method = MatrixMethod::Penalty(Penalty::Tikhonov);
+            let settings = MatrixSettings { most_noise, ..MatrixSettings::new(method) };
+            let found = own.reconstruct(&y, &settings).unwrap();
+            let missed = found.image.pixels().iter().zip(&truth);
+            missed.map(|(a, b)| (f64::from(*a) - b).powi(2)).sum::<f64>() / 256.0
+        };
+        let (alone, told) = (error(None), error(Some(sigma)));
+        // Without its mean, the scene has a variance of 1/4.
+        assert!(alone > 0.05 && told < 0.005 + sigma * sigma / 64.0, "{sigma}: {alone}, {told}");
+        assert_eq!(error(Some(1e3)), alone, "more noise than the measurements say");
+    }
+    // Each of several measurements has its own.
+    let y = seen(&weights, &truth, 0.5);
+    let method = MatrixMethod::Penalty(Penalty::Tikhonov);
+    let of = |most_noise: Vec<Option<f64>>, all: &[&[f64]]| {
+        let settings = MatrixSettings { most_noise, ..MatrixSettings::new(method) };
+        own.reconstruct_all(all, &settings).unwrap()
+    };
+    let both = of(vec![None, Some(0.5)], &[&y, &y]);
+    assert_eq!(both[..1], of(vec![None], &[&y])[..]);
+    assert_eq!(both[1..], of(vec![Some(0.5)], &[&y])[..]);
+    assert_ne!(both[0], both[1]);
 }
 
 #[test]
