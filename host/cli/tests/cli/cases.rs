@@ -8,7 +8,7 @@ use nirspi::files::npy::{encode, read_stack};
 use nirspi::files::trace::{self, Cut};
 use nirspi_recon::Order;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The inputs; they are not part of this repository.
 pub fn cases() -> Option<PathBuf> {
@@ -219,12 +219,43 @@ fn with_nan(bytes: &[u8]) -> Vec<Vec<u8>> {
     all
 }
 
-/// Each file cut at many bytes, and with NaN: what its readers say of it is one line, or readings that are finite.
+/// A selection of patterns in natural order, or by the file's own rows.
+fn selection(shown: Option<Order>) -> Selection {
+    Selection { shown, ..Selection::default() }
+}
+
+/// What every reader says of the file at this path is one line, or readings that are finite.
+fn is_read_or_refused(path: &Path, orders: &[Option<Order>]) {
+    let is_line = |line: String| {
+        assert!(line.starts_with(path.to_str().unwrap()), "{line}");
+        assert_eq!(line.lines().count(), 1, "{line}");
+    };
+    for shown in orders {
+        let want = selection(shown.clone());
+        match Several::open(path, &want).and_then(|mut several| several.each()) {
+            Ok(all) => {
+                for one in all {
+                    let values = one.readings.values();
+                    assert!(values.iter().all(|value| value.is_finite()), "{}", path.display());
+                }
+            }
+            Err(error) => is_line(error.to_string()),
+        }
+    }
+    if let Err(error) = Contents::open(path, false) {
+        is_line(error.to_string());
+    }
+    let cut = Cut { samples: Some(4), ..Cut::default() };
+    if let Err(error) = trace::read(path, &cut) {
+        is_line(error.to_string());
+    }
+}
+
+/// Each file cut at many bytes, and with NaN.
 #[test]
 #[ignore = "long: .ci/run demo"]
 fn a_damaged_file_is_read_in_part_or_refused_in_one_line() {
     let bench = Bench::new();
-    let orders = [None, Some(Order::Natural)];
     for (name, bytes) in all_files() {
         let path = bench.path(&name);
         let step = (bytes.len() / 60).max(1);
@@ -232,29 +263,47 @@ fn a_damaged_file_is_read_in_part_or_refused_in_one_line() {
         let cut = cuts.map(|end| bytes[..end].to_vec());
         for damaged in cut.chain(with_nan(&bytes)) {
             std::fs::write(&path, &damaged).unwrap();
-            let is_line = |line: String| {
-                assert!(line.starts_with(path.to_str().unwrap()), "{name}: {line}");
-                assert_eq!(line.lines().count(), 1, "{name}: {line}");
-            };
-            for shown in orders.clone() {
-                let want = Selection { shown, ..Selection::default() };
-                match Several::open(&path, &want).and_then(|mut several| several.each()) {
-                    Ok(all) => {
-                        for one in all {
-                            let values = one.readings.values();
-                            assert!(values.iter().all(|value| value.is_finite()), "{name}");
-                        }
-                    }
-                    Err(error) => is_line(error.to_string()),
-                }
-            }
-            if let Err(error) = Contents::open(&path, false) {
-                is_line(error.to_string());
-            }
-            let cut = Cut { samples: Some(4), ..Cut::default() };
-            if let Err(error) = trace::read(&path, &cut) {
-                is_line(error.to_string());
-            }
+            is_read_or_refused(&path, &[None, Some(Order::Natural)]);
+        }
+        std::fs::remove_file(&path).unwrap();
+    }
+}
+
+/// A text with its first and its last lines: those between them are all alike.
+fn with_few_lines(bytes: Vec<u8>) -> Vec<u8> {
+    let lines: Vec<&[u8]> = bytes.split_inclusive(|&byte| byte == b'\n').collect();
+    match std::str::from_utf8(&bytes).is_ok() && lines.len() > FIRST + LAST {
+        true => [lines[..FIRST].concat(), lines[lines.len() - LAST..].concat()].concat(),
+        false => bytes,
+    }
+}
+
+/// Lines that are kept: all of an instrument's preamble, and some of its table.
+const FIRST: usize = 30;
+const LAST: usize = 2;
+
+/// Longest file that is cut at every byte, and bytes at either end of a longer one that is cut at each of them.
+const SHORT: usize = 900;
+const ENDS: usize = 100;
+
+/// Short files of every form, and both ends of longer ones, cut at every byte.
+#[test]
+#[ignore = "long: .ci/run demo"]
+fn a_file_cut_at_any_byte_is_read_in_part_or_refused_in_one_line() {
+    let bench = Bench::new();
+    for (name, bytes) in all_files() {
+        let (path, bytes) = (bench.path(&name), with_few_lines(bytes));
+        let middle = match bytes.len() {
+            0..=SHORT => 0..0,
+            length => ENDS..length - ENDS,
+        };
+        // The way in which the whole file is read.
+        std::fs::write(&path, &bytes).unwrap();
+        let by_rows = Several::open(&path, &selection(None)).is_ok();
+        let order = [(!by_rows).then_some(Order::Natural)];
+        for end in (0..bytes.len()).filter(|end| !middle.contains(end)) {
+            std::fs::write(&path, &bytes[..end]).unwrap();
+            is_read_or_refused(&path, &order);
         }
         std::fs::remove_file(&path).unwrap();
     }
