@@ -9,6 +9,7 @@
 //! At time 0 the light is that of the target at rest
 //! (`a_target_starts_where_it_rests_and_comes_back` in `host/optics/tests/motion.rs`).
 
+use crate::pose::Pose;
 use crate::projector::{ProjectorError, SharpGrid};
 use crate::{LEDS, Projector, SIDE, Scene};
 use thiserror::Error;
@@ -59,35 +60,6 @@ impl Motion {
             Some((name, value, least, most)) => Err(MotionError { name, value, least, most }),
             None => Ok(()),
         }
-    }
-}
-
-/// Where the target is at a time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pose {
-    /// Place of the centre on the target plane, to the right of the axis.
-    pub x_mm: f64,
-    /// Place of the centre below the axis.
-    pub y_mm: f64,
-    /// Angle by which the target has turned clockwise.
-    pub turned_deg: f64,
-}
-
-impl Pose {
-    /// The place on the target that lies at this place before the camera, from the centres of both.
-    #[must_use]
-    pub fn on_target(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
-        let (sin, cos) = self.turned_deg.to_radians().sin_cos();
-        let (x, y) = (x_mm - self.x_mm, y_mm - self.y_mm);
-        // The target's own axes have turned clockwise, with y down.
-        [x * cos + y * sin, y * cos - x * sin]
-    }
-
-    /// Where this place on the target lies before the camera.
-    #[must_use]
-    pub fn before_camera(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
-        let (sin, cos) = self.turned_deg.to_radians().sin_cos();
-        [self.x_mm + x_mm * cos - y_mm * sin, self.y_mm + x_mm * sin + y_mm * cos]
     }
 }
 

@@ -7,7 +7,7 @@
 //! the piecewise-constant map (a summed-area table), for any size of the rectangle
 //! (`tests::a_mean_counts_parts_of_pixels_and_the_surround`).
 
-use crate::motion::Pose;
+use crate::pose::Pose;
 use thiserror::Error;
 
 /// Pixels along the side of a target that a motion has taken elsewhere.

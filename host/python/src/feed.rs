@@ -7,7 +7,7 @@ use crate::arrays::{array, slice, whole};
 use crate::errors::{of_file, of_source, refusal, refused};
 use crate::loaded::Loaded;
 use crate::made::made;
-use crate::work::{SIGNALS, backend, heavy, long};
+use crate::work::{SIGNALS, backend, heavy, long, signals};
 use nirspi::causes::in_one_line;
 use nirspi::files::feed::{Account, Address, Feed as Readings, FeedError, Giver, Header, Next};
 use nirspi::files::feed::{Recorder, mean};
@@ -40,7 +40,7 @@ fn of_feed(error: FeedError) -> PyErr {
 
 /// Whether Python goes on: no Ctrl-C and no other signal that raises. The exception is kept.
 fn goes_on(raised: &Mutex<Option<PyErr>>) -> bool {
-    match Python::attach(Python::check_signals) {
+    match signals() {
         Ok(()) => true,
         Err(error) => {
             *lock(raised) = Some(error);

@@ -84,7 +84,7 @@ pub fn long<T: Send>(
             let mut interrupt = None;
             while is_done.recv_timeout(SIGNALS) == Err(RecvTimeoutError::Timeout) {
                 if interrupt.is_none() {
-                    interrupt = Python::attach(Python::check_signals).err();
+                    interrupt = signals().err();
                     stop.store(interrupt.is_some(), Ordering::Relaxed);
                 }
             }
@@ -92,6 +92,15 @@ pub fn long<T: Send>(
             interrupt.map_or(made, Err)
         })
     })
+}
+
+/// The exception of a signal that has come, such as Ctrl-C.
+#[expect(
+    clippy::redundant_closure_for_method_calls,
+    reason = "the method itself holds for one lifetime alone"
+)]
+pub fn signals() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
 }
 
 /// The backend of this name, if it is there.

@@ -1,11 +1,11 @@
 //! What several laws begin with: the virtual camera, its answers and its recordings, made by the
 //! program's own writers.
 
-use nirspi::provenance::Made;
 use nirspi::capture::{Calibration, CaptureOptions, Record, capture};
 use nirspi::identity::CameraIdentity;
 use nirspi::info::info;
 use nirspi::link::{Link, Received};
+use nirspi::provenance::Made;
 use nirspi::recording::Target;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
@@ -72,7 +72,8 @@ pub fn capture_options(record: Option<Target>) -> CaptureOptions {
         setup: setup(),
         frames: Some(3),
         calibration: Calibration::None,
-        record: record.map(|target| Record { target, made: Made::by("a test", None, ["a test"], 0) }),
+        record: record
+            .map(|target| Record { target, made: Made::by("a test", None, ["a test"], 0) }),
     }
 }
 

@@ -176,7 +176,7 @@ fn a_way_is_told_once_and_numbers_are_short() {
     let (bench, scene) = (Bench::new(), Natural::new());
     let mut y = scene.y.clone();
     y[70] = 9.9e37;
-    let text: Vec<String> = y.iter().chain(&scene.y).map(|y| y.to_string()).collect();
+    let text: Vec<String> = y.iter().chain(&scene.y).map(ToString::to_string).collect();
     let header = r#"{"n": 16, "order": "natural", "readings": "pairs"}"#;
     bench.write("feed.txt", format!("{header}\n{}\n", text.join(" ")).as_bytes());
     let capture = ["capture", "--camera", "feed:feed.txt", "--frames", "2", "--out", "rec.npz"];

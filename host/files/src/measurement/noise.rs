@@ -1,6 +1,6 @@
 //! What a file says of the noise of its differences, and what its pairs say.
 
-use super::opened::is_reading;
+use super::readings::is_reading;
 use crate::fields::Fields;
 
 /// The field with the standard deviation of the noise of `d`, if it is known.

@@ -2,7 +2,9 @@
 
 use super::called::called;
 use super::noise::{Deviations, MOST_NOISE, NOISE};
-use super::readings::{NamedReadings, check_infinite, expected_of, found_names, readings_field};
+use super::readings::{
+    NamedReadings, check_infinite, expected_of, found_names, is_reading, readings_field,
+};
 use super::reference::read_reference;
 use super::remedy::all_on;
 use super::rows::{Shown, read_rows, read_side, repeats, shown, side_of_pixels};
@@ -294,11 +296,6 @@ fn mean<P: Iterator<Item = usize>>(
     }
     sums.iter_mut().for_each(|sum| *sum /= positions.len() as f64);
     sums
-}
-
-/// Whether a number is a reading, and not a sign that there is none.
-pub(crate) fn is_reading(value: f64) -> bool {
-    value.abs() < OVERLOAD
 }
 
 /// The form that the file states for `y`. A field of another kind says nothing.

@@ -9,7 +9,13 @@ use crate::array::has_shape;
 use crate::field::Field;
 use crate::fields::{Fields, UNNAMED};
 use crate::stored::Stored;
+use nirspi_recon::law::OVERLOAD;
 use std::path::Path;
+
+/// Whether a number is a reading, and not a sign that there is none.
+pub(crate) fn is_reading(value: f64) -> bool {
+    value.abs() < OVERLOAD
+}
 
 /// A field of readings, and the layout of its measurements.
 pub(super) struct NamedReadings {

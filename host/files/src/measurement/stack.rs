@@ -4,8 +4,9 @@
 //! The block has the numbers that the measurements have one by one, and is refused in the same words
 //! (`tests::stack`).
 
-use super::opened::{Opened, is_reading};
+use super::opened::Opened;
 use super::readings::check_infinite;
+use super::readings::is_reading;
 use super::{FileError, Form, Remedy};
 use crate::provenance::Taken;
 use crate::stored::Stored;
