@@ -12,7 +12,8 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The place on the target that lies at this place before the camera, from the centres of both.
+    /// The point of the target that the camera sees at this point of its field: from the axis, in mm, to the right and down. The
+    /// result is from the centre of the target, along its own sides.
     #[must_use]
     pub fn on_target(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
         let (sin, cos) = self.turned_deg.to_radians().sin_cos();
@@ -21,7 +22,7 @@ impl Pose {
         [x * cos + y * sin, y * cos - x * sin]
     }
 
-    /// Where this place on the target lies before the camera.
+    /// The point of the camera's field at which it sees this point of the target: the inverse of [`on_target`](Self::on_target).
     #[must_use]
     pub fn before_camera(&self, x_mm: f64, y_mm: f64) -> [f64; 2] {
         let (sin, cos) = self.turned_deg.to_radians().sin_cos();

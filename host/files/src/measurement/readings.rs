@@ -12,7 +12,7 @@ use crate::stored::Stored;
 use nirspi_recon::law::OVERLOAD;
 use std::path::Path;
 
-/// Whether a number is a reading, and not a sign that there is none.
+/// Whether a number of a file is a reading. NaN and the numbers by which instruments report an overload are none.
 pub(crate) fn is_reading(value: f64) -> bool {
     value.abs() < OVERLOAD
 }

@@ -104,7 +104,7 @@ fn fine_detail_of_a_complete_set_is_kept_where_the_noise_is_known_to_be_less() {
         let (alone, told) = (error(None), error(Some(sigma)));
         // Without its mean, the scene has a variance of 1/4.
         assert!(alone > 0.05 && told < 0.005 + sigma * sigma / 64.0, "{sigma}: {alone}, {told}");
-        assert_eq!(error(Some(1e3)), alone, "more noise than the measurements say");
+        assert_eq!(error(Some(1e3)), alone, "a limit above the estimated noise changes nothing");
     }
     // Each of several measurements has its own.
     let y = seen(&weights, &truth, 0.5);
