@@ -13,7 +13,7 @@ use crate::moving::followed;
 use crate::provenance::Taken;
 use crate::recording::RecordingError;
 use crate::tally::Misfit;
-use nirspi_recon::law::{self, Claim, Doubt, Lamp, Places, Reading};
+use nirspi_recon::law::{self, Claim, Doubt, Lamp, Places, Reading, Witness};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{
     Dropout, Image, MeasurementError, Measurements, Order, Outlier, Rows, ShorterSweep, reconstruct,
@@ -494,7 +494,7 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
     }
     let mut warnings: Vec<String> = read.doubts.iter().map(Doubt::to_string).collect();
     warnings.extend(overload_words(&file.overloads));
-    let lamp = read.lamp.or(file.lamp);
+    let lamp = file.lamp.or(read.lamp);
     warnings.extend(lamp.and_then(|lamp| drift_words(lamp, file.claim)));
     let complex = file.imaginary.is_some();
     let reference = file.reference.map(|Reference { real, imaginary }| {
@@ -526,12 +526,16 @@ fn from_file(path: &Path, file: MeasurementFile, part: Part) -> Result<Source, S
 
 /// A warning about a lamp whose drift limits the image.
 fn drift_words(lamp: Lamp, claim: Claim) -> Option<String> {
-    (lamp.limits && !claim.divide_by_lamp).then(|| {
-        format!(
-            "the lamp drifts by {:.1} % over the sweep, which harms the image more than the noise; --divide-by-lamp corrects it, \
-             if there is no ambient light",
-            100.0 * lamp.drift
-        )
+    let drift = 100.0 * lamp.drift;
+    (lamp.limits && !claim.divide_by_lamp).then(|| match lamp.by {
+        Witness::Level => format!(
+            "the level of the readings drifts by {drift:.1} % over the sweep, as if the lamp or the dark level did: show the all-on \
+             pattern again and again, which --divide-by-lamp uses, or each pattern and its complement"
+        ),
+        Witness::Sums | Witness::AllOn(_) => format!(
+            "the lamp drifts by {drift:.1} % over the sweep, which harms the image more than the noise; --divide-by-lamp corrects \
+             it, if there is no ambient light"
+        ),
     })
 }
 

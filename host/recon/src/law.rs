@@ -24,6 +24,7 @@ mod pairs;
 mod repeats;
 mod robust;
 mod signed;
+mod trend;
 
 pub use doubt::{Broken, Doubt, Explanation, Extreme};
 pub use dropout::Dropout;
@@ -73,7 +74,7 @@ pub struct Reading {
     pub doubts: Vec<Doubt>,
     /// The dark level that was found in readings of single patterns and removed.
     pub dark_level: Option<f64>,
-    /// How steady the light was, of pairs that are what they are said to be.
+    /// How steady the light was, of pairs that are what they are said to be; of patterns alone, a drift that limits the image.
     pub lamp: Option<Lamp>,
 }
 
@@ -172,7 +173,7 @@ fn all_equal(y: &[f64], form: Form) -> Option<Doubt> {
 }
 
 /// The most readings, of this many, that count as a few.
-fn few(of: usize) -> usize {
+pub(crate) fn few(of: usize) -> usize {
     match of {
         // One of three is not a few.
         0..=7 => 0,

@@ -46,7 +46,7 @@ mod stacked;
 mod video;
 mod weight;
 
-pub use explanation::{Explanation, explanation};
+pub use explanation::{Explanation, better_shift, explanation};
 pub use frame::{believed_frame, fused_frame};
 pub use held_back::HeldBack;
 pub use kind::GoingOn;
@@ -55,8 +55,8 @@ pub use methods::hadamard;
 pub use noise::estimated_noise;
 pub use own_atoms::omp_over;
 pub use own_matrix::{
-    DarkLevel, KnownNoise, LiveMatrix, MatrixError, MatrixMethod, MatrixReconstruction,
-    MatrixSettings, NoiseFrom, OwnMatrix,
+    DarkLevel, KnownNoise, LiveMatrix, MatrixDoubt, MatrixError, MatrixMethod,
+    MatrixReconstruction, MatrixSettings, NoiseFrom, OwnMatrix,
 };
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};

@@ -7,7 +7,7 @@ use super::{Passed, Shared};
 use nirspi::clock::Instant;
 use nirspi::files::measurement::{Patterns, Plain};
 use nirspi::imaging::{SteadyWhite, White};
-use nirspi::reconstruct::matrix_doubts;
+use nirspi::reconstruct::{matrix_doubts, matrix_warnings};
 use nirspi_recon::reconstruct::{
     LiveMatrix, MatrixSettings, Method, MethodSettings, OwnMatrix, ReconstructError, Strength,
 };
@@ -65,7 +65,8 @@ impl OwnImages {
         }
         shared.passed(Passed::Reconstructed, look.arrived);
         let white_counts = white.follow(White::Brightest.level(&made.image));
-        let warnings = ready.doubts.iter().cloned();
+        let warnings = matrix_warnings(&made, |k| ready.places[k]).into_iter();
+        let warnings = warnings.chain(ready.doubts.iter().cloned());
         let warnings = warnings.chain(made.dark.note().map(str::to_owned)).collect();
         let picture = made_of(look, settings, shared, &made.image, white_counts, reconstruct_ms);
         Ok(Picture { warnings, ..picture })

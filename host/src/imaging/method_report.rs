@@ -2,7 +2,7 @@
 
 use nirspi_recon::Measurements;
 use nirspi_recon::omp::Backend;
-use nirspi_recon::reconstruct::{HeldBack, Method, Report, explanation};
+use nirspi_recon::reconstruct::{HeldBack, Method, Report, better_shift, explanation};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use std::fmt;
@@ -36,9 +36,18 @@ impl MethodReport {
             Some(cause) => format!("they fit {cause}"),
             None => "they are noise, or belong to patterns of another order".to_owned(),
         };
+        Some(by_chance(held_back, cause))
+    }
+
+    /// A warning if the readings predict each other far better as those of other patterns, a few places away.
+    #[must_use]
+    pub fn better_shift(&self, measurements: &Measurements) -> Option<String> {
+        let found = self.made.held_back?;
+        let (shift, better) = better_shift(measurements, found)?;
+        let [confirmed, better] = [found, better].map(|found| 100.0 * found.confirmed);
         Some(format!(
-            "readings predict each other no better than chance ({:.0} % of their variation is confirmed): {cause}",
-            100.0 * held_back.confirmed
+            "{better:.0} % of the readings' variation is confirmed if they are {shift}, and {confirmed:.0} % as they are: --shift \
+             moves them"
         ))
     }
 
@@ -47,6 +56,14 @@ impl MethodReport {
     pub fn short(&self) -> String {
         self.made.short()
     }
+}
+
+/// The warning that readings predict each other by chance alone, and why.
+pub(crate) fn by_chance(held_back: HeldBack, cause: impl fmt::Display) -> String {
+    format!(
+        "readings predict each other no better than chance ({:.0} % of their variation is confirmed): {cause}",
+        100.0 * held_back.confirmed
+    )
 }
 
 /// Deviation of the readings, in standard deviations of their noise, below which a scene is even.
@@ -102,8 +119,8 @@ impl Serialize for MethodReport {
 }
 
 /// What held-back readings say of the image.
-#[derive(PartialEq, Serialize)]
-struct HeldBackReport {
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeldBackReport {
     /// Sum of the absolute and of the squared error of the predictions, each as a share of that of zeros: 2 is no better
     /// than zeros.
     error: f64,

@@ -202,9 +202,11 @@ pub(super) fn file_images(
 pub(super) fn all_warnings(source: &Source, report: &MethodReport) -> Vec<String> {
     let mut warnings = source.all_warnings();
     // A named form of the readings says more.
-    if source.warnings.is_empty() {
-        warnings.extend(report.doubt(&source.measurements));
-    }
+    let doubt = source.warnings.is_empty().then(|| report.doubt(&source.measurements)).flatten();
+    // A recording of our own camera numbers its readings.
+    let may_be_shifted = doubt.is_none() && source.frames.is_none();
+    let shift = may_be_shifted.then(|| report.better_shift(&source.measurements)).flatten();
+    warnings.extend(doubt.or(shift));
     warnings
 }
 

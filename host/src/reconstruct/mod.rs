@@ -21,7 +21,8 @@ pub use many::Skipped;
 pub use networks::NetworksError;
 pub use one::{DropoutReport, LampReport, OneReport};
 pub use own::{
-    OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, matrix_doubts, own_image,
+    OwnError, OwnFrames, OwnImage, OwnInput, OwnMade, OwnReport, matrix_doubts, matrix_warnings,
+    own_image,
 };
 pub use pipeline::Pipeline;
 pub use pipeline_error::PipelineError;

@@ -40,12 +40,14 @@ pub struct LampReport {
 }
 
 impl LampReport {
-    fn of(Lamp { by, spread, drift, .. }: Lamp) -> Self {
+    /// `None` if only a drift is known, of which a warning says all.
+    fn of(Lamp { by, spread, drift, .. }: Lamp) -> Option<Self> {
         let all_on_readings = match by {
             Witness::Sums => None,
             Witness::AllOn(count) => Some(count),
+            Witness::Level => return None,
         };
-        Self { all_on_readings, spread, drift }
+        Some(Self { all_on_readings, spread, drift })
     }
 }
 
@@ -199,7 +201,7 @@ pub(super) fn one_image(
         dropouts: dropouts.collect(),
         outliers: source.outliers.iter().map(OutlierReport::of).collect(),
         not_read: source.not_read,
-        lamp: source.lamp.map(LampReport::of),
+        lamp: source.lamp.and_then(LampReport::of),
         part: parts.as_ref().map(|_| Part::Magnitude.name()),
         frames: source.frames,
         correlation_with_files_recon: correlation,

@@ -6,6 +6,7 @@ use super::{SolverError, check_finite, not_read_words, read_atoms, write_image};
 use crate::files::FileError;
 use crate::files::measurement::{PatternSelection, Plain, Selection, read_plain, read_plain_all};
 use crate::files::output::OutputDir;
+use crate::imaging::{HeldBackReport, by_chance};
 use crate::picture::{FigureStyle, Pictures, Unit};
 use crate::provenance;
 use crate::stage_times::StageTimes;
@@ -66,7 +67,7 @@ pub struct OwnReport {
 #[serde(untagged)]
 pub enum OwnFrames {
     /// One image.
-    One(OwnMade),
+    One(Box<OwnMade>),
     /// All, in their order.
     All {
         /// How each was made.
@@ -126,6 +127,13 @@ pub struct OwnMade {
     pub relative_residual: f64,
     /// Patterns that the file marks as not read.
     pub not_read: Vec<usize>,
+    /// Patterns whose readings no scene can have given beside the others. They are left out.
+    pub outliers: Vec<usize>,
+    /// How well held-back readings are predicted by the others, where that is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_back: Option<HeldBackReport>,
+    /// What speaks against the image, one line each.
+    pub warnings: Vec<String>,
     /// Notes for the user.
     pub notes: Vec<String>,
 }
@@ -171,7 +179,7 @@ pub fn own_image(request: OwnImage<'_>, mut times: StageTimes) -> Result<OwnRepo
     let (of, all) = images(&request, plain, &mut times)?;
     let (mut images, mut frames): (Vec<Image<Size>>, Vec<OwnMade>) = all.into_iter().unzip();
     if !request.all {
-        let (image, made) = (images.remove(0), OwnFrames::One(frames.remove(0)));
+        let (image, made) = (images.remove(0), OwnFrames::One(Box::new(frames.remove(0))));
         let pictures = Pictures::of_image(&image, Unit::Readings, None, *figure, &provenance);
         let report = OwnReport { of, made, pictures, stage_ms: times };
         write_image(request.out, &image, None, None, &report.pictures, &report)?;
@@ -278,13 +286,15 @@ fn same(
         check_finite(request.input, &found.image)?;
         let Plain { not_read, notes, .. } = &plain[at];
         let mut notes = notes.clone();
+        let warnings = matrix_warnings(&found, |k| places[k]);
+        let outliers: Vec<usize> = found.outliers.iter().map(|&k| places[k]).collect();
         notes.extend((!not_read.is_empty()).then(|| not_read_words(not_read)));
         notes.extend(doubts.iter().cloned());
         notes.extend(found.dark.note().map(str::to_owned));
         let method = Method::of_matrix(found.method).unwrap_or_default();
         let weighed = known.filter(|_| found.method == MatrixMethod::Penalty(Penalty::Tikhonov));
         let made = OwnMade {
-            used,
+            used: used - outliers.len(),
             rank: own.rank(),
             unseen_pixels: own.unseen_pixels(),
             method,
@@ -297,6 +307,9 @@ fn same(
             noise_from: weighed.map(|known| known.from.name()),
             relative_residual: found.residual,
             not_read: not_read.clone(),
+            outliers,
+            held_back: found.held_back.map(Into::into),
+            warnings,
             notes,
         };
         Ok((found.image, made))
@@ -313,6 +326,21 @@ pub fn matrix_doubts(own: &OwnMatrix) -> impl Iterator<Item = String> + use<> {
     let unseen = own.unseen_pixels();
     let unseen = (unseen > 0).then(|| format!("no pattern sees {}", count_of(unseen, "pixel")));
     others.into_iter().chain(unseen)
+}
+
+/// What speaks against an image, one line each. `place` is that of a reading's pattern among those shown.
+#[must_use]
+pub fn matrix_warnings(
+    found: &MatrixReconstruction,
+    place: impl Fn(usize) -> usize,
+) -> Vec<String> {
+    let outliers = found.outliers.iter().map(|&k| {
+        let at = place(k);
+        format!("outlier: reading [{at}] is far outside all others; its pattern is left out")
+    });
+    let doubt = found.held_back.zip(found.doubt.as_ref());
+    let doubt = doubt.map(|(held_back, doubt)| by_chance(held_back, doubt));
+    outliers.chain(doubt).collect()
 }
 
 impl OwnMade {
@@ -340,7 +368,7 @@ impl OwnReport {
         let (input, matrix) = (input.display(), matrix.display());
         match &self.made {
             OwnFrames::One(made) => {
-                let OwnMade { used, rank, .. } = made;
+                let OwnMade { used, rank, .. } = &**made;
                 let of = format!("{used} of {patterns} patterns of {matrix}, rank {rank}");
                 vec![format!("{input}: {height} x {width}, {of}"), made.words()]
             }
@@ -360,16 +388,26 @@ impl OwnReport {
     /// The notes for the user: one that all images of a stack have stands there once.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
+        self.lines(|made| &made.notes)
+    }
+
+    /// What speaks against the images, in the same way.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        self.lines(|made| &made.warnings)
+    }
+
+    fn lines(&self, of: impl Fn(&OwnMade) -> &Vec<String>) -> Vec<String> {
         let frames = match &self.made {
-            OwnFrames::One(made) => return made.notes.clone(),
+            OwnFrames::One(made) => return of(made).clone(),
             OwnFrames::All { frames } => frames,
         };
         let Some((first, others)) = frames.split_first() else { return Vec::new() };
-        let is_of_all = |note: &&String| others.iter().all(|frame| frame.notes.contains(note));
-        let of_all: Vec<String> = first.notes.iter().filter(is_of_all).cloned().collect();
+        let is_of_all = |line: &&String| others.iter().all(|frame| of(frame).contains(line));
+        let of_all: Vec<String> = of(first).iter().filter(is_of_all).cloned().collect();
         let own = frames.iter().enumerate().flat_map(|(at, frame)| {
-            let own = frame.notes.iter().filter(|note| !of_all.contains(note));
-            own.map(move |note| format!("frame {at}: {note}"))
+            let own = of(frame).iter().filter(|line| !of_all.contains(line));
+            own.map(|line| format!("frame {at}: {line}")).collect::<Vec<_>>()
         });
         let own: Vec<String> = own.collect();
         [of_all, own].concat()

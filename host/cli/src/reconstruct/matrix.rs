@@ -42,6 +42,7 @@ pub fn run(args: &Args, matrix: &Path) -> Result<ExitCode> {
 
 fn say(args: &Args, report: &OwnReport) -> Result<()> {
     report.words().iter().try_for_each(print::line)?;
+    report.warnings().iter().for_each(print::warning);
     print::notes(&report.notes())?;
     wrote(format_args!("image.npy, {}", report.pictures), &args.out)
 }

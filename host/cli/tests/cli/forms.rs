@@ -200,6 +200,33 @@ fn the_sums_of_pairs_tell_and_correct_a_lamp_that_drifts() {
 }
 
 /// Readings without complements, with the all-on pattern in each 16th place, under a lamp of known drift and flicker.
+/// Readings without complements tell less: a shift by what the patterns predict, a drift by their level.
+#[test]
+fn a_shift_and_a_drift_of_patterns_alone_are_told() {
+    let (bench, measured) = (Bench::new(), Measured::new(32));
+    let y = measured.natural();
+    let pairs = y.as_chunks::<2>().0;
+    let (single, d): (Vec<f32>, Vec<f32>) = pairs.iter().map(|[p, m]| (*p, p - m)).unzip();
+    let told = |y: &[f32], form: &str| {
+        bench.write("y.npy", &encode(&[y.len()], y));
+        let line = ["reconstruct", "y.npy", "--shown", "natural", "--side", "32", "--readings"];
+        bench.run(&[&line[..], &[form]].concat()).succeeded().stderr
+    };
+    for (y, form) in [(&single, "single"), (&d, "differences")] {
+        let said = told(y, form);
+        assert!(!said.contains("warning"), "{form}: {said}");
+    }
+    let said = told(&d[1..], "differences");
+    assert!(said.contains("readings of the pattern 1 place later in the order"), "{said}");
+    // The all-on reading is missed, and one of another pattern taken for it.
+    let said = told(&single[1..], "single");
+    assert!(said.contains("the all-on reading may be saturated"), "{said}");
+    let drifting: Vec<f32> =
+        single.iter().enumerate().map(|(at, y)| y * (1.0 + 0.1 * at as f32 / 1024.0)).collect();
+    let said = told(&drifting, "single");
+    assert!(said.contains("the level of the readings drifts by 9."), "{said}");
+}
+
 #[test]
 fn readings_of_the_all_on_pattern_tell_and_correct_a_lamp_that_drifts() {
     let (bench, measured) = (Bench::new(), Measured::new(16));

@@ -324,6 +324,35 @@ fn patterns_and_readings_come_in_one_file_of_matlab() {
     }
 }
 
+/// Readings that do not belong to their patterns, alone and among the measurements of a stack.
+#[test]
+fn readings_that_no_scene_gives_by_these_patterns_are_named() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let (weights, y) = own_patterns(&measured, 201);
+    bench.write("phi.npy", &npy::encode(&[200, 256], &weights[..200 * 256]));
+    let mut spoilt = y[..200].to_vec();
+    spoilt[50] *= 8.0;
+    let run = |y: &[f32], more: &[&str]| {
+        bench.write("y.npy", &npy::encode(&[y.len() / 200, 200], y));
+        bench.run(&[&["reconstruct", "y.npy", "--matrix", "phi.npy"], more].concat()).succeeded()
+    };
+    let right = run(&y[..200], &["--index", "0"]);
+    assert!(!right.stderr.contains("warning"), "{}", right.stderr);
+    let confirmed = bench.json("out/report.json")["held_back"]["confirmed_share"].as_f64().unwrap();
+    assert!(confirmed > 0.5, "{confirmed}");
+    let words = "warning: outlier: reading [50] is far outside all others; its pattern is left out";
+    assert!(run(&spoilt, &["--index", "0"]).stderr.contains(words));
+    assert!(correlation(&bench.pixels("out/image.npy"), &measured.image) > 0.9);
+    let report = bench.json("out/report.json");
+    assert_eq!((&report["used"], &report["outliers"]), (&199.into(), &[50].into()));
+    let all = [&y[..200], &spoilt].concat();
+    let said = run(&all, &["--index", "all"]).stderr;
+    assert!(said.contains("frame 1: outlier: reading [50]") && !said.contains("frame 0"), "{said}");
+    let late = run(&y[1..], &["--index", "0"]).stderr;
+    let words = "they fit readings of the pattern 1 place later in the order";
+    assert!(late.contains("no better than chance") && late.contains(words), "{late}");
+}
+
 /// All measurements of a file in one step: each image is the one that its measurement alone gives.
 #[test]
 #[ignore = "long: .ci/run demo"]

@@ -36,6 +36,8 @@ pub enum Witness {
     Sums,
     /// Readings of the all-on pattern among the others: their number.
     AllOn(usize),
+    /// The level of readings of patterns alone, where it drifts.
+    Level,
 }
 
 impl Lamp {

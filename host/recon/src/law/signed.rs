@@ -4,7 +4,7 @@ use super::ends::ends;
 use super::robust::{deviation, median, step};
 use super::{
     Broken, Claim, Doubt, Explanation, Extreme, Form, Impossible, OVERLOAD, Outlier, Places,
-    Reading, few, repeats,
+    Reading, few, repeats, trend,
 };
 use crate::measurements::{MeasurementError, Measurements};
 use crate::{Rows, order};
@@ -76,7 +76,7 @@ pub(super) fn read_single(
     }
     let (rows, y) = without(rows, y, &outliers);
     let mut measurements = Measurements::from_single(&rows, &y)?;
-    let mut dark_level = None;
+    let (mut dark_level, mut lamp) = (None, None);
     if doubts.is_empty() {
         let mut lifted = measurements.clone();
         if let Some(level) = lifted.remove_dark_level() {
@@ -90,8 +90,9 @@ pub(super) fn read_single(
                 doubts.push(Doubt::NoDarkLevel { level, least });
             }
         }
+        lamp = trend::lamp(&y);
     }
-    Ok(Reading { dark_level, ..Reading::of(measurements, outliers, doubts) })
+    Ok(Reading { dark_level, lamp, ..Reading::of(measurements, outliers, doubts) })
 }
 
 pub(super) fn read_differences(

@@ -38,7 +38,7 @@ impl HeldBack {
         let positions = order::positions_by_sequency(rows);
         let (mut miss, mut zero) = (Miss::default(), Miss::default());
         let (mut finer_miss, mut finer_zero) = (Miss::default(), Miss::default());
-        let (mut signs, mut squares) = (0.0, 0.0);
+        let mut signs = Signs::default();
         let left_out = rows.len() < rows.side().area();
         let first_finer = if left_out { positions.len() / 2 } else { 0 };
         for (at, &k) in positions.iter().enumerate() {
@@ -51,17 +51,31 @@ impl HeldBack {
                 finer_miss.add(missed);
                 finer_zero.add(unpredicted);
             }
-            let both = value * predicted;
-            signs += both.signum() * both.abs().sqrt();
-            squares += both.abs();
+            signs.add(value, predicted);
         }
         if finer_zero.squared() <= 0.0 {
             return None;
         }
         Some(Self {
             miss: finer_miss.relative_to(finer_zero),
-            confirmed: (1.0 - miss.squared() / zero.squared()).clamp(0.0, 1.0),
-            score: if squares > 0.0 { signs / squares.sqrt() } else { 0.0 },
+            confirmed: confirmed(miss, zero),
+            score: signs.score(),
+        })
+    }
+
+    /// Judges predictions of measurements by any patterns, all of which count alike: each measurement with its prediction.
+    /// `None` if all measurements are 0, or there are none.
+    pub(super) fn of_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
+        let (mut miss, mut zero, mut signs) = (Miss::default(), Miss::default(), Signs::default());
+        for (value, predicted) in pairs {
+            miss.add(Miss::of(value - predicted));
+            zero.add(Miss::of(value));
+            signs.add(value, predicted);
+        }
+        (zero.squared() > 0.0).then(|| Self {
+            miss: miss.relative_to(zero),
+            confirmed: confirmed(miss, zero),
+            score: signs.score(),
         })
     }
 
@@ -80,6 +94,30 @@ impl HeldBack {
     #[must_use]
     pub fn is_by_chance(&self) -> bool {
         self.score < Self::BY_CHANCE
+    }
+}
+
+/// Share of the squares of `zero` that predictions with this miss explain.
+fn confirmed(miss: Miss, zero: Miss) -> f64 {
+    (1.0 - miss.squared() / zero.squared()).clamp(0.0, 1.0)
+}
+
+/// Agreement in sign of values and predictions.
+#[derive(Default)]
+struct Signs {
+    sum: f64,
+    squares: f64,
+}
+
+impl Signs {
+    fn add(&mut self, value: f64, predicted: f64) {
+        let both = value * predicted;
+        self.sum += both.signum() * both.abs().sqrt();
+        self.squares += both.abs();
+    }
+
+    fn score(&self) -> f64 {
+        if self.squares > 0.0 { self.sum / self.squares.sqrt() } else { 0.0 }
     }
 }
 

@@ -37,20 +37,23 @@
 //! relative to the standard deviation.
 
 mod complete;
+mod doubt;
 mod error;
 mod folds;
 mod gram;
 mod live;
 mod many;
 mod noise;
+mod outliers;
 mod problem;
 mod pseudo_inverse;
 mod solvers;
 
-use super::Penalty;
+use super::{HeldBack, Penalty};
 use crate::basis::{Basis, Transform};
 use crate::omp::Stop;
 use crate::{Image, Shape, Size};
+pub use doubt::MatrixDoubt;
 pub use error::MatrixError;
 pub use live::LiveMatrix;
 use nalgebra::{DMatrix, DVector};
@@ -109,6 +112,8 @@ pub struct MatrixSettings {
     /// What that noise is at most, for each of the measurements, where it is not known and more than the measurement says so.
     /// Only complete sets of orthogonal patterns need it: other measurements predict each other.
     pub most_noise: Vec<Option<f64>>,
+    /// Whether held-back measurements are to say how well the others predict them, where it does not take long.
+    pub judge: bool,
 }
 
 impl MatrixSettings {
@@ -126,7 +131,15 @@ impl MatrixSettings {
             dark: true,
             noise: None,
             most_noise: Vec::new(),
+            judge: true,
         }
+    }
+
+    /// The settings of these measurements alone, by their numbers.
+    fn of_some(&self, which: &[usize]) -> Self {
+        let most_noise = &self.most_noise;
+        let most_noise = which.iter().map(|&at| most_noise.get(at).copied().flatten()).collect();
+        Self { most_noise, ..self.clone() }
     }
 }
 
@@ -145,6 +158,13 @@ pub struct MatrixReconstruction {
     pub dark: DarkLevel,
     /// Norm of the residual, relative to the norm of the measurements without the dark level.
     pub residual: f64,
+    /// Numbers of the measurements that no scene can have given beside the others. The image is made without them.
+    pub outliers: Vec<usize>,
+    /// How well held-back measurements are predicted by the others, by Tikhonov's method: of no more patterns than pixels,
+    /// that are not a complete orthogonal set, if the [settings](MatrixSettings::judge) want it.
+    pub held_back: Option<HeldBack>,
+    /// A doubt whether the measurements belong to the patterns.
+    pub doubt: Option<MatrixDoubt>,
 }
 
 /// The detector's reading without light, in the measurements' units.
@@ -237,7 +257,10 @@ impl OwnMatrix {
             return Err(MatrixError::Shape { found: weights.len(), size });
         }
         finite("matrix", weights, area)?;
-        let patterns = DMatrix::from_row_slice(weights.len() / area, area, weights);
+        Self::of(size, DMatrix::from_row_slice(weights.len() / area, area, weights))
+    }
+
+    fn of(size: Size, patterns: DMatrix<f64>) -> Result<Self, MatrixError> {
         let orthogonal = energies_if_orthogonal(&patterns);
         let rank = match &orthogonal {
             Some(_) => patterns.nrows(),
@@ -297,10 +320,41 @@ impl OwnMatrix {
         settings: &MatrixSettings,
     ) -> Result<Vec<MatrixReconstruction>, MatrixError> {
         self.check(all, settings)?;
+        let expected = outliers::Expected::new(self);
+        let outliers: Vec<Vec<usize>> =
+            all.par_iter().map(|y| expected.outliers(self, y, settings.dark)).collect();
+        let (whole, others): (Vec<usize>, Vec<usize>) =
+            (0..all.len()).partition(|&at| outliers[at].is_empty());
+        let mut found: Vec<Option<MatrixReconstruction>> = vec![None; all.len()];
         let kept = many::Kept::default();
-        let batches =
-            all.chunks(BATCH).map(|all| many::Many::new(self, settings, all, &kept).images());
-        Ok(batches.collect::<Result<Vec<_>, _>>()?.concat())
+        for which in whole.chunks(BATCH) {
+            let settings = settings.of_some(which);
+            let some: Vec<&[f64]> = which.iter().map(|&at| all[at]).collect();
+            let images = many::Many::new(self, &settings, &some, &kept).images()?;
+            which.iter().zip(images).for_each(|(&at, image)| found[at] = Some(image));
+        }
+        for at in others {
+            let settings = settings.of_some(&[at]);
+            found[at] = Some(self.without(outliers[at].clone(), all[at], &settings)?);
+        }
+        Ok(found.into_iter().flatten().collect())
+    }
+
+    /// The image without the measurements of these numbers.
+    fn without(
+        &self,
+        outliers: Vec<usize>,
+        y: &[f64],
+        settings: &MatrixSettings,
+    ) -> Result<MatrixReconstruction, MatrixError> {
+        let left: Vec<usize> = (0..y.len()).filter(|k| !outliers.contains(k)).collect();
+        let own = Self::of(self.size, self.patterns.select_rows(&left))?;
+        let y: Vec<f64> = left.iter().map(|&k| y[k]).collect();
+        let made = many::Many::new(&own, settings, &[&y], &many::Kept::default()).images()?;
+        made.into_iter()
+            .next()
+            .map(|made| MatrixReconstruction { outliers, ..made })
+            .ok_or(MatrixError::Dark)
     }
 
     fn check(&self, all: &[&[f64]], settings: &MatrixSettings) -> Result<(), MatrixError> {

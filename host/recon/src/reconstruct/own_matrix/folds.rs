@@ -10,13 +10,18 @@
 use super::gram::gram;
 use super::problem::Fit;
 use super::solvers::{ITERATIONS, SETTLED};
-use super::{DarkLevel, MatrixSettings, OwnMatrix, STRENGTHS, energies, images, last_as_good};
+use super::{
+    DarkLevel, MatrixSettings, OwnMatrix, SPLIT_SEED, STRENGTHS, energies, images, last_as_good,
+};
 use crate::Size;
 use crate::basis::{Basis, Transform};
-use crate::reconstruct::noise;
+use crate::reconstruct::{HeldBack, noise};
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Part of the patterns' norm below which what is left of them is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -140,6 +145,30 @@ impl Products {
         tried.max_by(|a, b| likelihood(a).total_cmp(&likelihood(b)))
     }
 
+    /// Measurements of a made-up scene, with random coefficients of the expected sizes.
+    pub(super) fn of_a_scene(&self, own: &OwnMatrix) -> Vec<f64> {
+        let mut random = Pcg64::seed_from_u64(SPLIT_SEED);
+        let size = |size: &f32| size.sqrt() * (random.random::<f32>() - 0.5);
+        let mut image: Vec<f32> = self.sizes.iter().map(size).collect();
+        self.transform.synthesise(&mut image);
+        let image = DVector::from_iterator(image.len(), image.into_iter().map(f64::from));
+        (&own.patterns * image).as_slice().to_vec()
+    }
+
+    /// The same of the patterns at these places alone, which follow each other.
+    pub(super) fn of_some(&self, places: Range<usize>) -> Self {
+        let some = |v: &DVector<f64>| v.rows(places.start, places.len()).into_owned();
+        let (first, count) = (places.start, places.len());
+        Self {
+            transform: self.transform.clone(),
+            sizes: self.sizes.clone(),
+            products: self.products.view((first, first), (count, count)).into_owned(),
+            sums: some(&self.sums),
+            energies: some(&self.energies),
+            dark: self.dark,
+        }
+    }
+
     /// The problem of these measurements by the patterns of which these are the products. Without a strength, one is
     /// chosen.
     pub(super) fn folds<'p>(
@@ -172,10 +201,17 @@ impl Folds<'_> {
 
     /// Errors of each strength on the held-back measurements: sums of squares.
     pub(super) fn errors(&self) -> Vec<f64> {
-        let strengths = 0..self.strengths.len();
-        strengths
-            .map(|strength| self.parts[1..].iter().map(|part| self.missed(part, strength)).sum())
-            .collect()
+        let missed = |strength| self.held_back(strength).map(|held| held.missed().powi(2)).sum();
+        (0..self.strengths.len()).map(missed).collect()
+    }
+
+    /// How well held-back measurements are predicted by the others, at the strength that predicts them best; and the
+    /// deviation of the measurements around those of an even image.
+    pub(super) fn judgement(&self) -> Option<(HeldBack, f64)> {
+        let held: Vec<Held> = self.held_back(last_as_good(&self.errors())).collect();
+        let spread = held.iter().map(|held| held.value.powi(2)).sum::<f64>() / held.len() as f64;
+        let pairs = held.iter().map(|held| (held.value, held.predicted));
+        Some((HeldBack::of_pairs(pairs)?, spread.sqrt()))
     }
 
     /// The image of all measurements at the strength of this index, and the strength.
@@ -276,15 +312,30 @@ impl Folds<'_> {
         }
     }
 
-    /// Squared error of a part's image on the measurements that were held back from it.
-    fn missed(&self, part: &Part, strength: usize) -> f64 {
-        let seen = &self.of.products * &part.found[strength];
-        let level = self.level(part, &seen);
-        let held = (0..self.y.len()).filter(|&k| part.used[k] == 0.0);
-        held.map(|k| {
-            (self.y[k] - seen[k] - self.of.sums[k] * level.mean - level.dark.value()).powi(2)
+    /// The measurements that were held back from a part, each with its prediction by the others at the strength of this
+    /// index.
+    fn held_back(&self, strength: usize) -> impl Iterator<Item = Held> {
+        self.parts[1..].iter().flat_map(move |part| {
+            let seen = &self.of.products * &part.found[strength];
+            let level = self.level(part, &seen);
+            let held = (0..self.y.len()).filter(|&k| part.used[k] == 0.0);
+            held.map(move |k| Held {
+                value: self.y[k] - self.of.sums[k] * level.mean - level.dark.value(),
+                predicted: seen[k],
+            })
         })
-        .sum()
+    }
+}
+
+/// A held-back measurement and its prediction, both without the dark level and the mean of the image.
+struct Held {
+    value: f64,
+    predicted: f64,
+}
+
+impl Held {
+    fn missed(&self) -> f64 {
+        self.value - self.predicted
     }
 }
 

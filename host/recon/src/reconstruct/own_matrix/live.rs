@@ -1,6 +1,7 @@
 //! The images of one measurement after another by the same patterns, as a live view makes them.
 
 use super::many::{Kept, Many};
+use super::outliers::Expected;
 use super::{KnownNoise, MatrixError, MatrixReconstruction, MatrixSettings, OwnMatrix};
 use std::collections::VecDeque;
 
@@ -15,6 +16,7 @@ pub struct LiveMatrix {
     own: OwnMatrix,
     settings: MatrixSettings,
     kept: Kept,
+    expected: Expected,
     every: u32,
     /// The settings that were chosen, and how many images they still serve.
     chosen: Option<(MatrixSettings, u32)>,
@@ -31,7 +33,8 @@ impl LiveMatrix {
     #[must_use]
     pub fn new(own: OwnMatrix, settings: MatrixSettings, every: u32) -> Self {
         let (kept, newest) = (Kept::default(), VecDeque::new());
-        Self { own, settings, kept, every, chosen: None, newest, noise: None }
+        let expected = Expected::new(&own);
+        Self { own, settings, kept, expected, every, chosen: None, newest, noise: None }
     }
 
     /// The patterns.
@@ -64,10 +67,15 @@ impl LiveMatrix {
         let noise = self.settings.noise.or(self.noise.map(|known| known.sigma));
         let anew = MatrixSettings { noise, ..self.settings.clone() };
         let settings = chosen.as_ref().map_or(&anew, |(settings, _)| settings);
-        let made = Many::new(&self.own, settings, &[y], &self.kept).images()?.remove(0);
+        let outliers = self.expected.outliers(&self.own, y, settings.dark);
+        let made = match outliers.is_empty() {
+            true => Many::new(&self.own, settings, &[y], &self.kept).images()?.remove(0),
+            false => self.own.without(outliers, y, settings)?,
+        };
         self.chosen = chosen.map(|(settings, left)| (settings, left - 1)).or_else(|| {
             let (strength, sparsity) = (made.strength, made.atoms.map(|(size, _)| size));
-            let settings = MatrixSettings { method: made.method, strength, sparsity, ..anew };
+            let method = made.method;
+            let settings = MatrixSettings { method, strength, sparsity, judge: false, ..anew };
             Some((settings, self.every.saturating_sub(1)))
         });
         Ok(made)

@@ -6,6 +6,7 @@
 //! (`tests::many::images_are_those_of_each_alone`). The patterns of one fold at a time are prepared, so that the memory
 //! does not grow with the folds.
 
+use super::doubt::{EVEN, MatrixDoubt};
 use super::folds::{Folds, Products};
 use super::problem::{Fit, Prepared};
 use super::pseudo_inverse::PseudoInverse;
@@ -15,6 +16,7 @@ use super::{
 };
 use crate::Image;
 use crate::omp::Stop;
+use crate::reconstruct::HeldBack;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -25,6 +27,8 @@ pub(super) struct Many<'m> {
     settings: &'m MatrixSettings,
     all: &'m [&'m [f64]],
     kept: &'m Kept,
+    /// Of each, the problem of which held-back measurements choose the strength.
+    folds: Vec<OnceLock<Folds<'m>>>,
 }
 
 /// What depends on the patterns alone, for settings that differ in method, strength and number of atoms at most.
@@ -55,7 +59,8 @@ impl<'m> Many<'m> {
         all: &'m [&'m [f64]],
         kept: &'m Kept,
     ) -> Self {
-        Self { own, settings, all, kept }
+        let folds = all.iter().map(|_| OnceLock::new()).collect();
+        Self { own, settings, all, kept, folds }
     }
 
     /// The image of each.
@@ -136,8 +141,10 @@ impl<'m> Many<'m> {
                     let (own, y) = (self.own, self.all[*at]);
                     let known = self.settings.noise.filter(|sigma| *sigma > 0.0);
                     let likeliest = || products.likeliest(own, y, known?);
-                    let strength = self.settings.strength.or_else(likeliest);
-                    let (fit, strength) = products.folds(own, y, strength).chosen();
+                    let (fit, strength) = match self.settings.strength.or_else(likeliest) {
+                        None => self.folds(products, *at).chosen(),
+                        strength => products.folds(own, y, strength).chosen(),
+                    };
                     Made { fit, strength: Some(strength), atoms: None }
                 };
                 which.iter().map(made).collect()
@@ -154,16 +161,42 @@ impl<'m> Many<'m> {
         let left = (&y - &self.own.patterns * &pixels).norm();
         let residual = if y.norm() > 0.0 { left / y.norm() } else { 0.0 };
         let image = Image::new(self.own.size, pixels.iter().map(|&v| v as f32).collect());
-        MatrixReconstruction { image, method, strength, atoms, dark, residual }
+        let (held_back, doubt) = self.judged(at).unzip();
+        let (doubt, outliers) = (doubt.flatten(), Vec::new());
+        MatrixReconstruction {
+            image,
+            method,
+            strength,
+            atoms,
+            dark,
+            residual,
+            outliers,
+            held_back,
+            doubt,
+        }
     }
 
-    fn products(&self) -> Option<&Products> {
+    fn products(&self) -> Option<&'m Products> {
         self.kept.products.get_or_init(|| Products::new(self.own, self.settings)).as_ref()
     }
 
-    /// The problem of Tikhonov's method, of which there are the products.
-    fn folds<'p>(&'p self, products: &'p Products, at: usize) -> Folds<'p> {
-        products.folds(self.own, self.all[at], self.settings.strength)
+    /// The problem of Tikhonov's method, of which there are the products, whose strength is to be chosen.
+    fn folds(&self, products: &'m Products, at: usize) -> &Folds<'m> {
+        self.folds[at].get_or_init(|| products.folds(self.own, self.all[at], None))
+    }
+
+    /// What held-back measurements say of these, where that is known anyway or soon found out.
+    fn judged(&self, at: usize) -> Option<(HeldBack, Option<MatrixDoubt>)> {
+        let is_soon = self.folds[at].get().is_some() || self.own.patterns.len() <= TRIED;
+        if !self.settings.judge || !is_soon || complete::is_complete(self.own) {
+            return None;
+        }
+        let products = self.products()?;
+        let (found, spread) = self.folds(products, at).judgement()?;
+        let is_even = self.settings.noise.is_some_and(|noise| spread < EVEN * noise);
+        let doubt = (!is_even && found.is_by_chance())
+            .then(|| MatrixDoubt::of(self.own, products, self.all[at]));
+        Some((found, doubt.flatten()))
     }
 
     fn prepared(&self, method: MatrixMethod, at: Vec<usize>) -> Result<Prepared, MatrixError> {

@@ -69,6 +69,7 @@ fn a_live_view_chooses_once_for_many_images() {
                 method: first.method,
                 strength: first.strength,
                 sparsity: first.atoms.map(|(atoms, _)| atoms),
+                judge: false,
                 ..settings.clone()
             };
             for y in [&measured[1], &measured[2]] {
