@@ -48,6 +48,7 @@ mod outliers;
 mod problem;
 mod pseudo_inverse;
 mod solvers;
+mod symmetric;
 
 use super::{HeldBack, Penalty};
 use crate::basis::{Basis, Transform};
@@ -237,6 +238,9 @@ const SURELY_NEW: f64 = 1e-4;
 
 /// Number of patterns from which a first look in single precision saves time.
 const MANY: usize = 512;
+
+/// Number of patterns for each pixel more than there are patterns, in a look at some of the pixels.
+const ENOUGH_PIXELS: usize = 8;
 
 /// Relative difference of sums of weights that counts as rounding.
 const SAME_SUM: f64 = 1e-9;
@@ -504,9 +508,20 @@ fn rank(patterns: &DMatrix<f64>) -> usize {
         return 0;
     }
     let relative = |pattern: &mut [f64]| pattern.iter().map(|w| (w / largest) as f32).collect();
-    let is_wide = (MANY..=patterns.ncols()).contains(&patterns.nrows());
-    if is_wide && gram::are_independent(gram::gram(&images(patterns, relative)), SURELY_NEW) {
-        return patterns.nrows();
+    let (count, pixels) = patterns.shape();
+    let are_independent = |patterns: &DMatrix<f64>| {
+        gram::are_independent(gram::gram(&images(patterns, relative)), SURELY_NEW)
+    };
+    if (MANY..=pixels).contains(&count) {
+        // Patterns that are independent in some of the pixels are so in all.
+        let some = count + count / ENOUGH_PIXELS;
+        let in_some = || {
+            let places: Vec<usize> = (0..some).map(|k| k * pixels / some).collect();
+            are_independent(&patterns.select_columns(&places))
+        };
+        if (some < pixels && in_some()) || are_independent(patterns) {
+            return count;
+        }
     }
     let patterns = &(patterns / largest);
     let mut gram = match patterns.nrows() <= patterns.ncols() {

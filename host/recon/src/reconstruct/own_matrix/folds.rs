@@ -10,17 +10,16 @@
 use super::gram::gram;
 use super::problem::Fit;
 use super::solvers::{ITERATIONS, SETTLED};
+use super::symmetric::Symmetric;
 use super::{
     DarkLevel, MatrixSettings, OwnMatrix, SPLIT_SEED, STRENGTHS, energies, images, last_as_good,
 };
 use crate::Size;
 use crate::basis::{Basis, Transform};
 use crate::reconstruct::{HeldBack, noise};
-use nalgebra::{DMatrix, DVector};
-use pulp::{Arch, Simd, WithSimd};
+use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Part of the patterns' norm below which what is left of them is rounding.
@@ -35,7 +34,7 @@ pub(super) struct Products {
     /// Squares of the expected sizes; 0 for the mean, which has no penalty.
     sizes: Vec<f32>,
     /// `K`.
-    products: DMatrix<f64>,
+    products: Symmetric,
     /// Sum of the weights of each pattern.
     sums: DVector<f64>,
     /// Squared norm of each pattern.
@@ -93,13 +92,16 @@ impl Products {
         let sizes: Vec<f32> =
             frequencies.iter().map(|&f| if f > 0.0 { f.max(1.0).powi(-2) } else { 0.0 }).collect();
         let largest = own.patterns.amax();
-        let products = gram(&images(&own.patterns, |image| {
-            image.iter_mut().for_each(|weight| *weight /= largest);
-            let mut values: Vec<f32> = image.iter().map(|&weight| weight as f32).collect();
-            transform.analyse(&mut values);
-            values.iter_mut().zip(&sizes).for_each(|(value, size)| *value *= size.sqrt());
-            values
-        })) * (largest * largest);
+        let products = Symmetric::new(
+            gram(&images(&own.patterns, |image| {
+                image.iter_mut().for_each(|weight| *weight /= largest);
+                let mut values: Vec<f32> = image.iter().map(|&weight| weight as f32).collect();
+                transform.analyse(&mut values);
+                values.iter_mut().zip(&sizes).for_each(|(value, size)| *value *= size.sqrt());
+                values
+            })),
+            largest * largest,
+        );
         Some(Self {
             transform,
             sizes,
@@ -124,7 +126,7 @@ impl Products {
         let vector = |v: &[f32]| DVector::from_iterator(v.len(), v.iter().map(|&v| f64::from(v)));
         let rounded = |v: DVector<f64>| -> Vec<f32> { v.iter().map(|&v| v as f32).collect() };
         let times = |v: &[f32]| {
-            rounded(part.projected(&self.products * part.projected(vector(v))) * run.scale)
+            rounded(part.projected(self.products.times(&part.projected(vector(v)))) * run.scale)
         };
         let readings = noise::quadrature(rounded(run.direction.clone()), count, times)?;
         let ones = vec![1.0; folds.y.len()];
@@ -158,11 +160,10 @@ impl Products {
     /// The same of the patterns at these places alone, which follow each other.
     pub(super) fn of_some(&self, places: Range<usize>) -> Self {
         let some = |v: &DVector<f64>| v.rows(places.start, places.len()).into_owned();
-        let (first, count) = (places.start, places.len());
         Self {
             transform: self.transform.clone(),
             sizes: self.sizes.clone(),
-            products: self.products.view((first, first), (count, count)).into_owned(),
+            products: self.products.of_some(places.clone()),
             sums: some(&self.sums),
             energies: some(&self.energies),
             dark: self.dark,
@@ -217,7 +218,7 @@ impl Folds<'_> {
     /// The image of all measurements at the strength of this index, and the strength.
     fn fit(&self, strength: usize) -> (Fit, f64) {
         let whole = &self.parts[0];
-        let level = self.level(whole, &(&self.of.products * &whole.found[strength]));
+        let level = self.level(whole, &self.of.products.times(&whole.found[strength]));
         let weights: DVector<f64> = self.own.patterns.tr_mul(&whole.found[strength]);
         let unit = weights.amax().max(f64::MIN_POSITIVE);
         let mut image: Vec<f32> = weights.iter().map(|&weight| (weight / unit) as f32).collect();
@@ -261,7 +262,7 @@ impl Folds<'_> {
             if runs.iter().all(Run::has_settled) {
                 break;
             }
-            let seen = product(&self.of.products, &directions);
+            let seen = self.of.products.times_each(&directions);
             for ((run, part), seen) in runs.iter_mut().zip(&*parts).zip(seen) {
                 if !run.has_settled() {
                     run.advance(part.projected(seen) * run.scale, &self.strengths);
@@ -277,9 +278,10 @@ impl Folds<'_> {
     fn run(&self, part: &Part) -> Run {
         let y = part.projected(self.y.component_mul(&part.used));
         let shown = part.used.sum();
-        let free: f64 = part.free.iter().map(|free| free.dot(&(&self.of.products * free))).sum();
-        let energy = self.of.products.diagonal().dot(&part.used) - free;
-        let largest = self.of.products.diagonal().max();
+        let free: f64 = part.free.iter().map(|free| free.dot(&self.of.products.times(free))).sum();
+        let diagonal = self.of.products.diagonal();
+        let energy = diagonal.dot(&part.used) - free;
+        let largest = diagonal.max();
         // What rounding leaves of equal numbers is no contrast.
         let is_flat = y.norm() <= ROUNDING * self.y.component_mul(&part.used).norm()
             || energy <= 1e-7 * shown * largest;
@@ -316,7 +318,7 @@ impl Folds<'_> {
     /// index.
     fn held_back(&self, strength: usize) -> impl Iterator<Item = Held> {
         self.parts[1..].iter().flat_map(move |part| {
-            let seen = &self.of.products * &part.found[strength];
+            let seen = self.of.products.times(&part.found[strength]);
             let level = self.level(part, &seen);
             let held = (0..self.y.len()).filter(|&k| part.used[k] == 0.0);
             held.map(move |k| Held {
@@ -349,51 +351,6 @@ impl Part {
         }
         v
     }
-}
-
-/// The products of a symmetric matrix with some vectors, in one pass.
-fn product(matrix: &DMatrix<f64>, vectors: &[&DVector<f64>]) -> Vec<DVector<f64>> {
-    let size = matrix.nrows();
-    let vectors: Vec<&[f64]> = vectors.iter().map(|vector| vector.as_slice()).collect();
-    let dots = |row| Arch::new().dispatch(Dots { row, vectors: &vectors });
-    let rows: Vec<Vec<f64>> = matrix.as_slice().par_chunks_exact(size).map(dots).collect();
-    let of = |at: usize| DVector::from_iterator(size, rows.iter().map(|row| row[at]));
-    (0..vectors.len()).map(of).collect()
-}
-
-/// The inner products of a row with some vectors, as a type, because `pulp` compiles a type's method
-/// for each vector width.
-struct Dots<'a> {
-    row: &'a [f64],
-    vectors: &'a [&'a [f64]],
-}
-
-impl WithSimd for Dots<'_> {
-    type Output = Vec<f64>;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Vec<f64> {
-        // A closure would be compiled by itself, without the vectors.
-        let mut found = Vec::with_capacity(self.vectors.len());
-        for vector in self.vectors {
-            found.push(dot(self.row, vector));
-        }
-        found
-    }
-}
-
-/// Sums side by side, because the order of one sum would allow no vectors.
-#[inline(always)]
-fn dot(row: &[f64], vector: &[f64]) -> f64 {
-    let mut sums = [0.0; 32];
-    let ((rows, last), (vectors, end)) = (row.as_chunks::<32>(), vector.as_chunks::<32>());
-    for (row, vector) in rows.iter().zip(vectors) {
-        for ((sum, a), b) in sums.iter_mut().zip(row).zip(vector) {
-            *sum += a * b;
-        }
-    }
-    let rest: f64 = last.iter().zip(end).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
 }
 
 /// Conjugate gradients for the weakest strength, which is the last, and for the others with it.
