@@ -29,6 +29,7 @@ pub use enhance::{Enhance, EnhanceError, EnhancedImage, ImageContext, SPREAD_COP
 pub use frames::{
     FrameReport, FramesError, enhance_alike, enhance_frame, enhance_frames, enhance_frames_by,
 };
+#[cfg(all(feature = "enhance", not(target_family = "wasm")))]
 pub(crate) use method_report::by_chance;
 pub use method_report::{HeldBackReport, MethodReport};
 pub use quality::{Fit, Noise, Quality, score};

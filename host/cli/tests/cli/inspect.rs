@@ -193,6 +193,7 @@ fn a_way_is_told_once_and_numbers_are_short() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn patterns_traces_and_recordings_are_named_for_what_they_are() {
     let (bench, scene) = (Bench::new(), Natural::new());
     let weights: Vec<f32> = (0..40 * 180_u32).map(|k| ((k * k + k / 7) % 2) as f32).collect();

@@ -58,6 +58,7 @@ fn files_without_an_image_are_named_and_the_exit_code_says_so() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_file_of_several_and_a_recording_give_each_measurement_or_their_sum() {
     let bench = Bench::new();
     bench.run(&["capture", "--frames", "3", "--sampling", "10%", "--out", "rec.mcap"]).succeeded();

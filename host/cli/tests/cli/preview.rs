@@ -45,6 +45,7 @@ fn a_terminal_shows_the_newest_frames_as_an_image() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_terminal_without_colours_and_a_quiet_capture_show_no_image() {
     assert!(!written_to_a_terminal(Some("1"), &[]).contains('▀'));
     assert_eq!(written_to_a_terminal(None, &["--quiet"]), "");

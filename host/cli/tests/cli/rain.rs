@@ -125,6 +125,7 @@ fn curves_of_rain_are_written_as_pictures_and_numbers() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_scene_in_rain_is_captured_and_its_seed_repeats_it() {
     let bench = Bench::new();
     for out in ["a", "b"] {

@@ -39,6 +39,7 @@ fn right_readings_get_no_warning() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn readings_of_another_form_get_a_warning_that_names_the_form() {
     let bench = Bench::new();
     type Change = fn(Vec<f32>) -> Vec<f32>;
@@ -99,6 +100,7 @@ fn readings_without_the_first_one_are_shifted_by_an_option() {
 
 /// Pairs that come several times in a row keep the law of light, and look like those of a larger image.
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn patterns_that_were_shown_several_times_in_a_row_are_told_and_need_their_rows() {
     let bench = Bench::new();
     let four = |y: &[f32]| -> Vec<f32> {
@@ -146,6 +148,7 @@ fn words_of_a_converter_for_no_reading_are_drop_outs() {
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn what_a_warning_names_is_an_option_that_gives_the_image() {
     let bench = Bench::new();
     type Change = fn(Vec<f32>) -> Vec<f32>;

@@ -236,6 +236,7 @@ fn all_measurements_of_a_file_are_reconstructed_one_by_one_or_each_from_the_one_
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn frames_of_some_patterns_each_make_up_one_scene_with_those_before() {
     let (bench, measured) = (Bench::new(), Measured::new(16));
     let count = measured.h_row.len();

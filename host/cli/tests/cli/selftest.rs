@@ -7,6 +7,7 @@ use std::net::TcpListener;
 use std::sync::atomic::AtomicBool;
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_self_test_keeps_a_calibration_that_capture_then_uses_and_names() {
     let bench = Bench::new();
     let report = bench.run(&["camera", "selftest", "--json"]).succeeded().json();

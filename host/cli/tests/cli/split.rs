@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_split_capture_names_its_files_and_each_is_read_alone() {
     let bench = Bench::new();
     let capture = ["capture", "--frames", "900", "--no-calibration", "--adc-latency", "6"];

@@ -61,6 +61,7 @@ fn gives_the_image(bench: &Bench, trace: &Trace, arguments: &[&str]) -> Outcome 
 }
 
 #[test]
+#[ignore = "long: .ci/run demo"]
 fn a_trace_gives_the_image_by_its_trigger_and_by_the_number_of_samples() {
     let (bench, trace) = (Bench::new(), Trace::new());
     bench.write("trace.csv", trace.csv().as_bytes());

@@ -72,9 +72,11 @@ pub fn better_shift(
         return None;
     }
     let tried = shifts(measurements.rows()).filter_map(|trial| judged(measurements, trial));
-    let (shift, best) = tried.max_by(|(_, a), (_, b)| a.confirmed.total_cmp(&b.confirmed))?;
-    let is_far_better = 1.0 - best.confirmed < FAR_LESS * (1.0 - found.confirmed)
-        && best.score >= HeldBack::AMONG_MANY;
+    // The few largest readings of a scene may be predicted under any shift; the signs of all are not.
+    let least = HeldBack::AMONG_MANY.max(found.score);
+    let named = tried.filter(|(_, trial)| trial.score >= least);
+    let (shift, best) = named.max_by(|(_, a), (_, b)| a.confirmed.total_cmp(&b.confirmed))?;
+    let is_far_better = 1.0 - best.confirmed < FAR_LESS * (1.0 - found.confirmed);
     is_far_better.then_some((shift, best))
 }
 

@@ -123,7 +123,7 @@ fn is_formless(own: &OwnMatrix, k: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruct::{MatrixMethod, MatrixSettings};
+    use crate::reconstruct::{LiveMatrix, MatrixMethod, MatrixSettings};
     use crate::testing::{binary_patterns, scene, side};
     use crate::{Image, Side};
     use rand::{RngExt, SeedableRng};
@@ -148,6 +148,8 @@ mod tests {
             let settings = MatrixSettings::new(MatrixMethod::Best);
             let found = own.reconstruct(&y, &settings).unwrap();
             assert_eq!(found.outliers, [17, 130], "scene {kind}");
+            let live = LiveMatrix::new(own.clone(), settings.clone(), 3).image(&y).unwrap();
+            assert_eq!(live, found, "a live view leaves them out as well");
             let right = own.reconstruct(&clear, &settings).unwrap();
             assert!(right.outliers.is_empty());
             let [found, right] = [found, right].map(|made| correlation(&made.image, &truth));
