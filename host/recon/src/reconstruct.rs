@@ -26,6 +26,7 @@
 //! could be held back, so that cross-validation cannot see what it does not know.
 //! [`LOWEST_SEQUENCIES`] avoids it.
 
+mod explain;
 mod explanation;
 mod frame;
 mod held_back;
@@ -46,7 +47,8 @@ mod stacked;
 mod video;
 mod weight;
 
-pub use explanation::{Explanation, better_shift, explanation};
+pub use explain::{better_shift, explanation};
+pub use explanation::Explanation;
 pub use frame::{believed_frame, fused_frame};
 pub use held_back::HeldBack;
 pub use kind::GoingOn;
