@@ -2,10 +2,6 @@
 
 use super::array::to_c_order;
 
-/// The kind of file that a path should lead to, for error messages.
-pub(super) const EXPECTED: &str =
-    "measurements: .npz, .npy, .mat, .h5, .csv, .txt or .wav, or a recording (.mcap)";
-
 /// Share of the mean step by which the steps of evenly spaced numbers may differ: times are often
 /// written with few digits.
 const UNEVEN: f64 = 0.3;

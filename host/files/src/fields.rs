@@ -6,7 +6,8 @@
 
 use super::FileError;
 use super::archive::Archive;
-use super::field::{EXPECTED, Field, is_counter};
+use super::field::{Field, is_counter};
+use super::formats::{self, Columns, EXPECTED};
 #[cfg(feature = "hdf5")]
 use super::hdf5::Hdf5;
 use super::mat::Mat;
@@ -17,7 +18,6 @@ use super::plain::{
 };
 use super::stored::Stored;
 use super::text;
-use super::wav;
 use crate::provenance::{FIELD, Origin, Provenance, Taken, beside_array};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -48,7 +48,8 @@ pub(super) struct Fields {
     /// The provenance that a text or the file beside an array states, as JSON.
     provenance: Option<String>,
     is_text: bool,
-    is_wav: bool,
+    /// The format of the columns, if it is one of the list.
+    of_list: Option<&'static Columns>,
 }
 
 enum Format {
@@ -86,7 +87,7 @@ impl Fields {
     pub(super) fn open(path: &Path, decimal_comma: bool) -> Result<Self, FileError> {
         let (_, length, start) = open_start(path, EXPECTED, START_BYTES)?;
         let (mut skipped, mut provenance, mut is_text) = (None, None, false);
-        let is_wav = wav::is_start(&start);
+        let mut of_list = None;
         let (names, format) = if start.starts_with(b"PK") {
             let archive = Archive::open(path)?;
             (archive.names().to_vec(), Format::Npz(archive))
@@ -101,13 +102,14 @@ impl Fields {
         } else if is_mat_4(&start) {
             let mat = Mat4::open(path, whole(path, length, "a MATLAB file")?)?;
             (mat.names(), Format::Mat4(mat))
-        } else if is_wav {
-            let mut channels = wav::read(path)?;
-            match channels.len() {
-                1 => (Vec::new(), Format::Unnamed(channels.remove(0))),
+        } else if let Some(format) = formats::of_start(&start) {
+            of_list = Some(format);
+            let mut columns = (format.read)(path)?;
+            match columns.len() {
+                1 => (Vec::new(), Format::Unnamed(columns.remove(0))),
                 count => {
-                    let names = (1..=count).map(|channel| channel.to_string());
-                    (names.collect(), Format::Columns(channels))
+                    let names = (1..=count).map(|column| column.to_string());
+                    (names.collect(), Format::Columns(columns))
                 }
             }
         } else if let Some(kind) = kind_of_text(&start) {
@@ -125,18 +127,20 @@ impl Fields {
         } else {
             return Err(FileError::kind(path, kind_of(path, &start), EXPECTED));
         };
-        let is_of_text = matches!(format, Format::Columns(_) | Format::Unnamed(_)) && !is_wav;
+        let is_of_text =
+            matches!(format, Format::Columns(_) | Format::Unnamed(_)) && of_list.is_none();
         if decimal_comma && !is_of_text {
-            return Err(FileError::kind(path, kind_by_start(&start), "text for --decimal-comma"));
+            let kind = of_list.map_or_else(|| kind_by_start(&start), |format| format.name);
+            return Err(FileError::kind(path, kind, "text for --decimal-comma"));
         }
         let opened = Self::of_format(path, names, format);
-        Ok(Self { skipped, provenance, is_text, is_wav, ..opened })
+        Ok(Self { skipped, provenance, is_text, of_list, ..opened })
     }
 
     fn of_format(path: &Path, names: Vec<String>, format: Format) -> Self {
         let (path, made, called) = (path.to_owned(), Vec::new(), Vec::new());
-        let (skipped, provenance, is_text, is_wav) = (None, None, false, false);
-        Self { path, names, format, made, called, skipped, provenance, is_text, is_wav }
+        let (skipped, provenance, is_text, of_list) = (None, None, false, None);
+        Self { path, names, format, made, called, skipped, provenance, is_text, of_list }
     }
 
     /// One array without a name that was made of the file at `path`.
@@ -151,10 +155,10 @@ impl Fields {
             Format::Unnamed(field) => Format::Unnamed(field.clone()),
             _ => return Self::open(&self.path, false),
         };
-        let (skipped, is_text, is_wav) = (self.skipped.clone(), self.is_text, self.is_wav);
+        let (skipped, is_text, of_list) = (self.skipped.clone(), self.is_text, self.of_list);
         let provenance = self.provenance.clone();
         let again = Self::of_format(&self.path, self.names.clone(), format);
-        Ok(Self { skipped, provenance, is_text, is_wav, ..again })
+        Ok(Self { skipped, provenance, is_text, of_list, ..again })
     }
 
     /// The format, in a few words.
@@ -166,8 +170,9 @@ impl Fields {
             #[cfg(feature = "hdf5")]
             Format::Hdf5(_) => "an HDF5 file",
             _ if self.is_text => "a text table",
-            _ if self.is_wav => "a WAV file",
-            Format::Columns(_) | Format::Unnamed(_) => "a NumPy array",
+            Format::Columns(_) | Format::Unnamed(_) => {
+                self.of_list.map_or("a NumPy array", |format| format.name)
+            }
         }
     }
 
@@ -175,7 +180,7 @@ impl Fields {
     pub(super) fn kind(&mut self, field: &str) -> Option<String> {
         match &mut self.format {
             Format::Npz(archive) => archive.kind(field),
-            Format::Unnamed(_) if !self.is_text && !self.is_wav => npy::kind(&self.path),
+            Format::Unnamed(_) if !self.is_text && self.of_list.is_none() => npy::kind(&self.path),
             _ => None,
         }
     }

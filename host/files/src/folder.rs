@@ -1,13 +1,12 @@
 //! The measurement files that a user names: files, and all that are in a folder.
 
 use super::FileError;
+use super::formats::ENDINGS;
 #[cfg(feature = "pictures")]
 use std::cmp::Ordering;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-
-/// Endings of the files that are taken for measurements.
-const ENDINGS: [&str; 9] = ["npz", "npy", "mat", "h5", "hdf5", "csv", "txt", "wav", "mcap"];
+use std::sync::LazyLock;
 
 /// The files that these paths name, in the order of the paths. A folder stands for the measurement
 /// files in it and in the folders below, in the order of their names. Hidden files and folders are
@@ -30,9 +29,9 @@ fn find(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let mut names = Vec::new();
     collect(folder, "", &mut names)?;
     if names.is_empty() {
-        const EXPECTED: &str =
-            "at least one of .npz, .npy, .mat, .h5, .hdf5, .csv, .txt, .wav, .mcap";
-        return Err(FileError::kind(folder, "no measurement file in the folder", EXPECTED));
+        static EXPECTED: LazyLock<String> =
+            LazyLock::new(|| format!("at least one of .{}", ENDINGS.join(", .")));
+        return Err(FileError::kind(folder, "no measurement file in the folder", &EXPECTED));
     }
     names.sort_unstable();
     Ok(names.into_iter().map(|(_, path)| path).collect())

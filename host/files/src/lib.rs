@@ -43,6 +43,8 @@ mod error;
 mod field;
 #[cfg(not(target_family = "wasm"))]
 mod fields;
+#[cfg(not(target_family = "wasm"))]
+mod formats;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(not(target_family = "wasm"))]
@@ -56,8 +58,6 @@ mod stored;
 mod testing;
 #[cfg(not(target_family = "wasm"))]
 mod text;
-#[cfg(not(target_family = "wasm"))]
-mod wav;
 
 pub use error::FileError;
 pub use plain::{read_at_most, read_small, read_small_text, read_text};

@@ -15,7 +15,8 @@ mod number;
 pub(super) use number::parse;
 
 use super::FileError;
-use super::field::{EXPECTED, Field};
+use super::field::Field;
+use super::formats::EXPECTED;
 use super::plain::{is_heading, read_large_text, start_of_text};
 use crate::provenance;
 use rayon::prelude::*;

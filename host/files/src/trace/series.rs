@@ -8,17 +8,13 @@
 use super::{FileError, Raw};
 use crate::archive::Archive;
 use crate::array::{ArrayError, Header, MAGIC, Take};
-use crate::field::EXPECTED as MEASUREMENTS;
 use crate::fields::{Fields, UNNAMED, stated_beside};
+use crate::formats::{EXPECTED as MEASUREMENTS, EXPECTED_TRACE as EXPECTED};
 use crate::npy;
 use crate::plain::open_start;
 use crate::provenance::Taken;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-
-/// The kind of file that a path should lead to, for error messages.
-const EXPECTED: &str =
-    "a trace: .npz, .npy, .mat, .h5, .csv, .txt or .wav, or numbers without a heading (--raw)";
 
 /// An open file of samples.
 pub(super) struct Series {

@@ -28,7 +28,7 @@ pub const LAWS: &[Law] = &[
             "host/files/src/hdf5.rs",
             "host/files/src/text.rs",
             "host/files/src/text/export.rs",
-            "host/files/src/wav.rs",
+            "host/files/src/formats/wav.rs",
         ],
         holds: files,
         seeds: file_seeds,

@@ -1,20 +1,24 @@
 //! Samples of a WAV file, which audio interfaces and loggers write: integers of 8 to 32 bits, or 32-bit floats.
 
-use super::FileError;
-use super::field::{EXPECTED, Field};
-use super::plain::{MAX_MEMORY_BYTES, open_file};
+use super::{Columns, EXPECTED};
+use crate::FileError;
+use crate::field::Field;
+use crate::plain::{MAX_MEMORY_BYTES, open_file};
 use hound::{Error, SampleFormat, WavReader};
 use nirspi_recon::words::count_of;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
+/// Channels as columns.
+pub(super) const FORMAT: Columns = Columns { name: "a WAV file", is_start, read };
+
 /// Whether a file with these first bytes is a WAV file.
-pub(super) fn is_start(start: &[u8]) -> bool {
+fn is_start(start: &[u8]) -> bool {
     start.starts_with(b"RIFF") && start.get(8..12) == Some(b"WAVE")
 }
 
 /// The samples of each channel, as the file has them: integers are not scaled.
-pub(super) fn read(path: &Path) -> Result<Vec<Field>, FileError> {
+fn read(path: &Path) -> Result<Vec<Field>, FileError> {
     let (file, length) = open_file(path, EXPECTED)?;
     let wrong = |found: String| FileError::kind(path, format!("a WAV file {found}"), EXPECTED);
     let refused = |error: Error| match error {
