@@ -11,5 +11,5 @@ fn a_baseline_that_was_left_out_names_the_feature_that_brings_it() {
         assert!(said, "{model}");
     }
     let models: Vec<_> = ShippedWeights::all().into_iter().flatten().map(|w| w.model).collect();
-    assert_eq!(models, ["estimator", "fsrcnn", "diffusion", "prior", "classifier"]);
+    assert_eq!(models, nirspi_weights::FILES.map(|(model, _)| model));
 }
