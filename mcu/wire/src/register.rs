@@ -98,7 +98,7 @@ registers! {
     /// See [`mode`].
     Mode = 0x08, ReadWrite, 0;
     /// Patterns of a sweep, 1 to 1024.
-    Patterns = 0x09, ReadWrite, 1024;
+    Patterns = 0x09, ReadWrite, crate::PATTERNS as u32;
     /// Clocks a slot lasts, 1 to 65 535.
     Dwell = 0x0A, ReadWrite, crate::CLOCKS_PER_PATTERN as u32;
     /// Samples left out at the start of a slot, below `Dwell`.

@@ -5,7 +5,7 @@
 //! pattern. A line is 0 for `+` and 1 for `-`. An LED is lit if the XOR of its two lines is 0. The
 //! complement of a pattern inverts the row lines.
 
-use crate::SIDE;
+use crate::{PATTERNS, SIDE};
 
 /// Bit `i` is the sign line of index `i` for the Walsh function `k`: `popcount(k & i) mod 2`.
 #[must_use]
@@ -33,11 +33,11 @@ pub const fn lit(rows: u32, columns: u32, row: u8, column: u8) -> bool {
     ((rows >> row) ^ (columns >> column)) & 1 == 0
 }
 
-/// Pattern shown `i`-th in sequency order: `bitrev(gray(i))` over ten bits (1-D Walsh order).
+/// Pattern shown `i`-th in sequency order: `bitrev(gray(i))` over the bits of a row (1-D Walsh order).
 #[must_use]
 pub const fn sequency(i: u16) -> u16 {
     let gray = i ^ (i >> 1);
-    gray.reverse_bits() >> (16 - 10)
+    gray.reverse_bits() >> (16 - PATTERNS.trailing_zeros())
 }
 
 #[cfg(test)]
