@@ -25,8 +25,8 @@ def methods() -> dict[str, str]:
     Examples
     --------
     >>> import nirspi as ns
-    >>> list(ns.methods())
-    ['hadamard', 'omp', 'pseudo-inverse', 'tikhonov', 'fista', 'tv', 'prior', 'auto']
+    >>> ns.methods()["hadamard"]
+    'Inverse Walsh-Hadamard transform; patterns that were not measured count as zero'
     """
     return {word: about for word, _name, about in _nirspi.methods()}
 
