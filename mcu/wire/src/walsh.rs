@@ -46,7 +46,7 @@ mod tests {
 
     #[test]
     fn lit_leds_are_the_positive_entries_of_the_hadamard_row() {
-        for k in 0..crate::PATTERNS {
+        for k in 0..PATTERNS {
             let (rows, columns) = pattern(k, false);
             let (inverted, same) = pattern(k, true);
             for r in 0..SIDE {
@@ -62,10 +62,10 @@ mod tests {
 
     #[test]
     fn sequency_counts_the_sign_changes_of_the_row() {
-        for i in 0..crate::PATTERNS {
+        for i in 0..PATTERNS {
             let k = sequency(i);
             let sign = |p: u16| (k & p).count_ones() & 1;
-            let changes = (1..crate::PATTERNS).filter(|&p| sign(p) != sign(p - 1)).count();
+            let changes = (1..PATTERNS).filter(|&p| sign(p) != sign(p - 1)).count();
             assert_eq!(changes, usize::from(i));
         }
     }
