@@ -29,7 +29,10 @@ impl MethodReport {
     pub fn doubt(&self, measurements: &Measurements) -> Option<String> {
         let held_back = self.made.held_back.filter(HeldBack::is_by_chance)?;
         // An even scene, as a white sheet, has nothing to predict.
-        if measurements.noise().is_some_and(|noise| deviation(measurements) < EVEN * noise) {
+        if measurements
+            .noise()
+            .is_some_and(|noise| deviation(measurements) < HeldBack::EVEN * noise)
+        {
             return None;
         }
         let cause = match explanation(measurements) {
@@ -65,9 +68,6 @@ pub(crate) fn by_chance(held_back: HeldBack, cause: impl fmt::Display) -> String
         100.0 * held_back.confirmed
     )
 }
-
-/// Deviation of the readings, in standard deviations of their noise, below which a scene is even.
-const EVEN: f64 = 1.5;
 
 /// Standard deviation of the measurements around 0, without that of the all-ones pattern.
 fn deviation(measurements: &Measurements) -> f64 {

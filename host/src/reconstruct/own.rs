@@ -295,7 +295,7 @@ fn same(
         let weighed = known.filter(|_| found.method == MatrixMethod::Penalty(Penalty::Tikhonov));
         let made = OwnMade {
             used: used - outliers.len(),
-            rank: own.rank(),
+            rank: found.rank,
             unseen_pixels: own.unseen_pixels(),
             method,
             basis: method.takes(Setting::Basis).then(|| basis.clone()),

@@ -347,6 +347,7 @@ fn readings_that_no_scene_gives_by_these_patterns_are_named() {
     assert!(correlation(&bench.pixels("out/image.npy"), &measured.image) > 0.9);
     let report = bench.json("out/report.json");
     assert_eq!((&report["used"], &report["outliers"]), (&199.into(), &[50].into()));
+    assert_eq!(report["rank"], 199, "of the patterns that are left");
     let all = [&y[..200], &spoilt].concat();
     let said = run(&all, &["--index", "all"]).stderr;
     assert!(said.contains("frame 1: outlier: reading [50]") && !said.contains("frame 0"), "{said}");

@@ -14,7 +14,7 @@ const FEWEST: usize = 64;
 /// lit by coarse parts of the scene, and have a level of their own.
 const OF_EACH_HALF: f64 = 0.3;
 
-/// Standard errors from which a drift is none by chance.
+/// A drift of at least this many standard errors does not come by chance.
 const SIGMAS: f64 = 8.0;
 
 /// The least error that is told, as a share of the signal.
@@ -130,12 +130,11 @@ mod tests {
                     }
                 }
                 for (kind, drift) in [(1, 0.1), (2, -0.1), (1, 0.3)] {
-                    let lamp = found(&rows, &single(&rows, kind, drift, 1e-3));
-                    // Hard edges fill few patterns of 16 x 16 pixels so that no level is left.
-                    let Some(lamp) = lamp.filter(|_| (n, kind) != (16, 2)) else {
-                        assert_eq!((n, kind), (16, 2), "{order}");
+                    // Readings of a figure with hard edges have no level on 16 x 16 pixels: few are near each other.
+                    if (n, kind) == (16, 2) {
                         continue;
-                    };
+                    }
+                    let lamp = found(&rows, &single(&rows, kind, drift, 1e-3)).unwrap();
                     let share = lamp.drift / f64::abs(drift);
                     assert!((0.8..1.1).contains(&share), "{order} {n} {kind}: {lamp:?}");
                     assert!(lamp.by == Witness::Level && lamp.limits);

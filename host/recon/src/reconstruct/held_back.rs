@@ -31,6 +31,10 @@ impl HeldBack {
     /// [`Self::BY_CHANCE`] by chance now and then.
     pub const AMONG_MANY: f64 = 5.0;
 
+    /// Deviation of the readings, in standard deviations of their noise, below which a scene is even, as a white sheet: it
+    /// has nothing to predict.
+    pub const EVEN: f64 = 1.5;
+
     /// Judges predictions, one for each reading. `trust` is the factor that the picture uses them
     /// with. `None` if there are no readings beside the all-ones pattern's, or all of those that
     /// [`Self::miss`] counts are 0.
@@ -64,7 +68,7 @@ impl HeldBack {
     }
 
     /// Judges predictions of measurements by any patterns, all of which count alike: each measurement with its prediction.
-    /// `None` if all measurements are 0, or there are none.
+    /// `None` if there are no measurements, or all are 0.
     pub(super) fn of_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
         let (mut miss, mut zero, mut signs) = (Miss::default(), Miss::default(), Signs::default());
         for (value, predicted) in pairs {

@@ -159,6 +159,8 @@ pub struct MatrixReconstruction {
     pub dark: DarkLevel,
     /// Norm of the residual, relative to the norm of the measurements without the dark level.
     pub residual: f64,
+    /// Number of linearly independent patterns among those that the image is made of.
+    pub rank: usize,
     /// Numbers of the measurements that no scene can have given beside the others. The image is made without them.
     pub outliers: Vec<usize>,
     /// How well held-back measurements are predicted by the others, by Tikhonov's method: of no more patterns than pixels,

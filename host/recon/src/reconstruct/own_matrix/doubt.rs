@@ -9,9 +9,6 @@ use crate::reconstruct::HeldBack;
 use crate::reconstruct::explanation::{Explanation, MOST_READINGS};
 use std::fmt;
 
-/// Deviation of the measurements, in standard deviations of their noise, below which a scene is even.
-pub(super) const EVEN: f64 = 1.5;
-
 /// Agreement in sign of a made-up scene's measurements with their predictions, in standard errors, from which the patterns
 /// overlap enough to judge.
 const ENOUGH: f64 = 8.0;

@@ -6,7 +6,7 @@
 //! (`tests::many::images_are_those_of_each_alone`). The patterns of one fold at a time are prepared, so that the memory
 //! does not grow with the folds.
 
-use super::doubt::{EVEN, MatrixDoubt};
+use super::doubt::MatrixDoubt;
 use super::folds::{Folds, Products};
 use super::problem::{Fit, Prepared};
 use super::pseudo_inverse::PseudoInverse;
@@ -170,6 +170,7 @@ impl<'m> Many<'m> {
             atoms,
             dark,
             residual,
+            rank: self.own.rank,
             outliers,
             held_back,
             doubt,
@@ -193,7 +194,7 @@ impl<'m> Many<'m> {
         }
         let products = self.products()?;
         let (found, spread) = self.folds(products, at).judgement()?;
-        let is_even = self.settings.noise.is_some_and(|noise| spread < EVEN * noise);
+        let is_even = self.settings.noise.is_some_and(|noise| spread < HeldBack::EVEN * noise);
         let doubt = (!is_even && found.is_by_chance())
             .then(|| MatrixDoubt::of(self.own, products, self.all[at]));
         Some((found, doubt.flatten()))

@@ -1,6 +1,6 @@
 //! Measurements that no scene can have given beside the others.
 //!
-//! A pattern without a form of its own, as a random one, collects light from everywhere. So its measurement is a sum of many
+//! A pattern without a form of its own, such as a random one, collects light from everywhere. So its measurement is a sum of many
 //! parts and lies about that of an even image as a normal number does, whatever the scene. One that lies far outside, such as a
 //! reading with a wrong digit, is not of the scene. A pattern with a form, as a wave or a single pixel, may meet a scene of the
 //! same form: its measurement is never called wrong.
@@ -10,8 +10,8 @@ use crate::basis::{Basis, Transform};
 use crate::law::few;
 use nalgebra::DVector;
 
-/// Distance from the others, in standard deviations, from which a measurement is none of a scene. A normal number lies there
-/// with a probability of 1e-15.
+/// A measurement at least this many standard deviations from the others is not of their scene. A normal number lies there with
+/// a probability of 1e-15.
 const FAR: f64 = 8.0;
 
 /// Fewest measurements whose spread says something.
