@@ -5,10 +5,8 @@
 //! (`tests::a_letter_is_a_43_mm_target_bright_on_dark`).
 
 use crate::files::FileError;
-use crate::files::image::{Reflectance, read_reflectance};
+use crate::files::image::{Filter, Reflectance, read_reflectance, resample};
 use crate::picture::Typeface;
-use image::imageops::{self, FilterType};
-use image::{ImageBuffer, Luma};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -247,20 +245,14 @@ impl SceneMap {
     }
 }
 
-/// Averages a picture down to `size_px`. The triangle filter spans two target pixels, so detail
-/// that is too fine is blurred instead of becoming false detail, and averages stay in `[0, 1]`.
+/// Averages a picture down to `size_px`.
 fn shrink(map: Reflectance, size_px: usize) -> Reflectance {
     if map.size_px <= size_px {
         return map;
     }
-    let edge = map.size_px as u32;
-    let picture: ImageBuffer<Luma<f32>, _> = ImageBuffer::from_raw(edge, edge, map.values)
-        .expect("a square map has its edge squared values");
-    let small = imageops::resize(&picture, size_px as u32, size_px as u32, FilterType::Triangle);
-    Reflectance {
-        size_px,
-        values: small.into_raw().into_iter().map(|value| value.clamp(0.0, 1.0)).collect(),
-    }
+    let [edge, size] = [map.size_px as u32, size_px as u32];
+    let values = resample(&map.values, (edge, edge), (size, size), Filter::Triangle);
+    Reflectance { size_px, values: values.into_iter().map(|v| v.clamp(0.0, 1.0)).collect() }
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@
 mod natural;
 
 use natural::Scenes;
+use nirspi::files::archive::Archive;
 use nirspi::picture::{Axis, Chart, Figure, FigureStyle, Line, Panel, Range, SideBySide, Unit};
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::completion::{Part, Row, Scene, compare, image, methods, quality};
@@ -78,14 +79,6 @@ fn parts(shares: &[f64], noise: f64) -> Vec<Part> {
     shares.iter().map(|&share| Part { order: Order::ZigZag, share, noise }).collect()
 }
 
-/// One array of an `.npz` file.
-fn array<T: npyz::Deserialize>(file: &Path, name: &str) -> Result<Vec<T>> {
-    let open = std::fs::File::open(file).map_err(|error| format!("{}: {error}", file.display()))?;
-    let mut archive = zip::ZipArchive::new(std::io::BufReader::new(open))?;
-    let member = npyz::NpyFile::new(archive.by_name(&format!("{name}.npy"))?)?;
-    Ok(member.into_vec()?)
-}
-
 /// The natural scenes that training has not seen.
 fn natural(data: &Path, n: u64, most: usize) -> Result<Vec<Scene>> {
     let scenes = Scenes::read(data)?;
@@ -100,10 +93,11 @@ fn natural(data: &Path, n: u64, most: usize) -> Result<Vec<Scene>> {
 /// Characters of groups that training has not seen, `count` of each stack.
 fn characters(data: &Path, stack: &str, group: Option<&str>, count: usize) -> Result<Vec<Scene>> {
     let file = data.join(format!("chars74k/{stack}_train.npz"));
-    let levels = array::<u8>(&file, "x")?;
+    let mut archive = Archive::open(&file)?;
+    let mut array = |name: &str| archive.numbers_of::<f32>(name, |_| Ok(()));
+    let levels: Vec<u8> = array("x")?.values.into_iter().map(|level| level as u8).collect();
     let groups: Vec<i64> = match group {
-        Some("writer") => array::<u8>(&file, "writer")?.into_iter().map(i64::from).collect(),
-        Some(group) => array::<i16>(&file, group)?.into_iter().map(i64::from).collect(),
+        Some(group) => array(group)?.values.into_iter().map(|number| number as i64).collect(),
         None => (0..levels.len() as i64 / 4096).collect(),
     };
     let held_out: serde_json::Value = serde_json::from_str(nirspi_nets::HELD_OUT)?;

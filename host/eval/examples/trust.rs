@@ -12,9 +12,8 @@
 
 mod natural;
 
-use image::imageops::{self, FilterType};
-use image::{ImageBuffer, Luma};
 use natural::Scenes;
+use nirspi::files::image::{Filter, resample};
 use nirspi::picture::FigureStyle;
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use nirspi_eval::characters;
@@ -100,11 +99,11 @@ fn natural(scenes: &Scenes) -> Result<Stack> {
     for (group, scene) in scenes.iter().enumerate() {
         for (top, left, side) in parts {
             let rows = scene.chunks_exact(width).skip(top).take(side);
-            let part: Vec<u8> = rows.flat_map(|row| row[left..left + side].to_vec()).collect();
-            let part = ImageBuffer::<Luma<u8>, _>::from_raw(side as u32, side as u32, part);
-            let part = part.ok_or("a part of a scene has another size")?;
-            let small = imageops::resize(&part, SIDE as u32, SIDE as u32, FilterType::Triangle);
-            levels.extend_from_slice(if side == SIDE { part.as_raw() } else { small.as_raw() });
+            let part = rows.flat_map(|row| &row[left..left + side]).map(|level| f32::from(*level));
+            let part: Vec<f32> = part.collect();
+            let [side, small] = [side as u32, SIDE as u32];
+            let small = resample(&part, (side, side), (small, small), Filter::Triangle);
+            levels.extend(small.into_iter().map(|level| level.round() as u8));
             groups.push(group as u32);
         }
     }

@@ -22,11 +22,9 @@
 //! and scaled so that their longer side is 48 pixels. Photographs are scaled to 64 pixels and
 //! padded with the levels of their own edge.
 
-use image::imageops::{self, FilterType};
-use image::{ImageBuffer, Luma};
 use nirspi::files::FileError;
 use nirspi::files::archive::Archive;
-use nirspi::files::image::{Grey, read_grey, to_level};
+use nirspi::files::image::{Filter, Grey, read_grey, to_level};
 use nirspi_nets::data::{AREA_PX, CLASSES, DataError, Kind, SIDE_PX, Stack};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -212,10 +210,10 @@ fn read_folder(folder: &Path, what: Folder) -> Result<Stack, FileError> {
         .map(|(file, ..)| {
             let picture = read_grey(file)?;
             match what {
-                Folder::Photographs => Ok(photograph(picture)),
+                Folder::Photographs => Ok(photograph(&picture)),
                 Folder::Type | Folder::Handwriting => {
                     let ink = picture.values.iter().map(|v| 1.0 - v).collect();
-                    centred(Grey { values: ink, ..picture }, GLYPH_PX).ok_or_else(|| {
+                    centred(&Grey { values: ink, ..picture }, GLYPH_PX).ok_or_else(|| {
                         FileError::kind(
                             file,
                             "an empty page",
@@ -242,35 +240,33 @@ fn read_folder(folder: &Path, what: Folder) -> Result<Stack, FileError> {
         .map_err(|error| refused(folder, &error))
 }
 
-type Picture = ImageBuffer<Luma<f32>, Vec<f32>>;
-
-fn buffer(grey: Grey) -> Picture {
-    ImageBuffer::from_raw(grey.width, grey.height, grey.values)
-        .expect("a picture has width times height values")
-}
-
-fn resized(picture: &Picture, longer_px: u32) -> Picture {
-    let (width, height) = picture.dimensions();
+fn resized(picture: &Grey, longer_px: u32) -> Grey {
+    let (width, height) = (picture.width, picture.height);
     let scale = longer_px as f32 / width.max(height) as f32;
     let size = |edge: u32| ((edge as f32 * scale).round() as u32).clamp(1, longer_px);
-    imageops::resize(picture, size(width), size(height), FilterType::Triangle)
+    picture.scaled((size(width), size(height)), Filter::Triangle)
+}
+
+/// Each pixel with its place: column and row.
+fn pixels(picture: &Grey) -> impl Iterator<Item = (u32, u32, f32)> {
+    let places = 0..picture.width * picture.height;
+    let wide = picture.width;
+    places.zip(&picture.values).map(move |(at, value)| (at % wide, at / wide, *value))
 }
 
 /// Cuts out and centres a bright character on dark, as 64 x 64 levels with a longer side of
 /// `longer_px`; `None` if there is no ink.
-pub(crate) fn centred(ink: Grey, longer_px: u32) -> Option<Vec<u8>> {
-    let picture = buffer(ink);
-    let inked = || picture.enumerate_pixels().filter(|(.., v)| v.0[0] > INK);
+pub(crate) fn centred(ink: &Grey, longer_px: u32) -> Option<Vec<u8>> {
+    let inked = || pixels(ink).filter(|(.., value)| *value > INK);
     let (left, right) = (inked().map(|(x, ..)| x).min()?, inked().map(|(x, ..)| x).max()?);
     let (top, bottom) = (inked().map(|(_, y, _)| y).min()?, inked().map(|(_, y, _)| y).max()?);
-    let cut =
-        imageops::crop_imm(&picture, left, top, right - left + 1, bottom - top + 1).to_image();
+    let cut = ink.part((left, top), (right - left + 1, bottom - top + 1));
     let small = resized(&cut, longer_px);
     let side = SIDE_PX as u32;
-    let (x0, y0) = ((side - small.width()) / 2, (side - small.height()) / 2);
+    let (x0, y0) = ((side - small.width) / 2, (side - small.height) / 2);
     let mut levels = vec![0; AREA_PX];
-    for (x, y, value) in small.enumerate_pixels() {
-        levels[((y + y0) * side + x + x0) as usize] = to_level(value.0[0]);
+    for (x, y, value) in pixels(&small) {
+        levels[((y + y0) * side + x + x0) as usize] = to_level(value);
     }
     Some(levels)
 }
@@ -278,16 +274,16 @@ pub(crate) fn centred(ink: Grey, longer_px: u32) -> Option<Vec<u8>> {
 /// A photograph as 64 x 64 levels: its longer side is 64 pixels, padded with the levels of its
 /// edge. If the rim is brighter than the middle, the result is a negative, so that characters are
 /// bright.
-fn photograph(picture: Grey) -> Vec<u8> {
-    let small = resized(&buffer(picture), SIDE_PX as u32);
-    let (width, height) = small.dimensions();
+fn photograph(picture: &Grey) -> Vec<u8> {
+    let small = resized(picture, SIDE_PX as u32);
+    let (width, height) = (small.width, small.height);
     let side = SIDE_PX as u32;
     let (x0, y0) = ((side - width) / 2, (side - height) / 2);
     let (mut rim, mut all) = (Vec::new(), 0.0);
-    for (x, y, value) in small.enumerate_pixels() {
-        all += value.0[0];
+    for (x, y, value) in pixels(&small) {
+        all += value;
         if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
-            rim.push(value.0[0]);
+            rim.push(value);
         }
     }
     let negative = rim.iter().sum::<f32>() / rim.len() as f32 > all / (width * height) as f32;
@@ -295,7 +291,7 @@ fn photograph(picture: Grey) -> Vec<u8> {
         .map(|at| {
             let x = (at % side).saturating_sub(x0).min(width - 1);
             let y = (at / side).saturating_sub(y0).min(height - 1);
-            let value = small.get_pixel(x, y).0[0];
+            let value = small.value(x, y);
             to_level(if negative { 1.0 - value } else { value })
         })
         .collect()

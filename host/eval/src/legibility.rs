@@ -5,9 +5,7 @@
 //! 10`) of the 62. Tesseract 5.3.0 then reads 49 of the 62 clean 64 x 64 characters of Chars74K's
 //! fonts, more than with a margin of 10, uncut, or as a word.
 
-use image::imageops::{self, FilterType};
-use image::{GrayImage, ImageBuffer, Luma};
-use nirspi::files::image::to_level;
+use nirspi::files::image::{Filter, Grey, to_level};
 use nirspi_nets::data::CHARACTERS;
 use std::io;
 use std::process::Command;
@@ -86,8 +84,8 @@ impl Judge {
         let stack = images.chunks_exact(height * width);
         let expected = stack.len();
         for (k, image) in stack.enumerate() {
-            let path = folder.path().join(format!("{k}.png"));
-            drawn(image, width).save(&path).map_err(io::Error::other)?;
+            let path = folder.path().join(format!("{k}.pgm"));
+            std::fs::write(&path, pgm(&drawn(image, width)))?;
             list.push_str(&format!("{}\n", path.display()));
         }
         // One run reads all images, because starting Tesseract takes longer than reading an image.
@@ -130,7 +128,7 @@ fn run(command: &mut Command) -> Result<String, LegibilityError> {
 }
 
 /// The character cut out, dark on bright, with a margin.
-fn drawn(image: &[f32], width: usize) -> GrayImage {
+fn drawn(image: &[f32], width: usize) -> Grey {
     let inked = || image.iter().enumerate().filter(|(_, v)| **v > INK).map(|(at, _)| at);
     let rows = || inked().map(|at| (at / width) as u32);
     let columns = || inked().map(|at| (at % width) as u32);
@@ -140,17 +138,24 @@ fn drawn(image: &[f32], width: usize) -> GrayImage {
     };
     let (top, high) = span(rows().min(), rows().max(), image.len() / width);
     let (left, wide) = span(columns().min(), columns().max(), width);
-    let cut = ImageBuffer::from_fn(wide, high, |x, y| {
-        Luma([1.0 - image[(top + y) as usize * width + (left + x) as usize]])
-    });
+    let dark = image.iter().map(|value| 1.0 - value).collect();
+    let picture = Grey { width: width as u32, height: (image.len() / width) as u32, values: dark };
     let scaled = (f64::from(wide) * f64::from(HEIGHT_PX) / f64::from(high)).round() as u32;
-    let cut = imageops::resize(&cut, scaled.max(1), HEIGHT_PX, FilterType::CatmullRom);
-    let (w, h) = (cut.width() + 2 * MARGIN_PX, HEIGHT_PX + 2 * MARGIN_PX);
-    let mut page = GrayImage::from_pixel(w, h, Luma([u8::MAX]));
-    for (x, y, value) in cut.enumerate_pixels() {
-        page.put_pixel(x + MARGIN_PX, y + MARGIN_PX, Luma([to_level(value.0[0])]));
+    let cut = picture.part((left, top), (wide, high));
+    let cut = cut.scaled((scaled.max(1), HEIGHT_PX), Filter::CatmullRom);
+    let (width, height) = (cut.width + 2 * MARGIN_PX, HEIGHT_PX + 2 * MARGIN_PX);
+    let mut page = vec![1.0; (width * height) as usize];
+    for (row, y) in cut.values.chunks_exact(cut.width as usize).zip(MARGIN_PX..) {
+        page[(y * width + MARGIN_PX) as usize..][..row.len()].copy_from_slice(row);
     }
-    page
+    Grey { width, height, values: page }
+}
+
+/// The bytes of a portable grey map (PGM, 8 bits).
+fn pgm(picture: &Grey) -> Vec<u8> {
+    let mut bytes = format!("P5 {} {} 255\n", picture.width, picture.height).into_bytes();
+    bytes.extend(picture.values.iter().map(|value| to_level(*value)));
+    bytes
 }
 
 #[cfg(test)]
@@ -164,10 +169,11 @@ mod tests {
         let bar = |at: usize| (1..5).contains(&(at / 8)) && (2..4).contains(&(at % 8));
         let image: Vec<f32> = (0..48).map(|at| if bar(at) { 0.8 } else { 0.0 }).collect();
         let page = drawn(&image, 8);
-        assert_eq!(page.dimensions(), (20 + 2 * MARGIN_PX, HEIGHT_PX + 2 * MARGIN_PX));
-        assert_eq!(page.get_pixel(MARGIN_PX + 10, MARGIN_PX + 20).0, [51]);
-        assert_eq!(page.get_pixel(MARGIN_PX - 1, MARGIN_PX + 20).0, [255]);
-        assert_eq!(drawn(&[0.0; 48], 8).dimensions(), (53 + 2 * MARGIN_PX, 80));
+        assert_eq!((page.width, page.height), (20 + 2 * MARGIN_PX, HEIGHT_PX + 2 * MARGIN_PX));
+        assert_eq!(to_level(page.value(MARGIN_PX + 10, MARGIN_PX + 20)), 51);
+        assert_eq!(page.value(MARGIN_PX - 1, MARGIN_PX + 20), 1.0);
+        let blank = drawn(&[0.0; 48], 8);
+        assert_eq!((blank.width, blank.height), (53 + 2 * MARGIN_PX, 80));
     }
 
     #[test]

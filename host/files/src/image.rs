@@ -9,24 +9,25 @@
 //! A picture with labels that this program has written (title, grey bar, warnings) is read as the
 //! image in it.
 
+mod canvas;
+mod encoded;
 mod labelled;
+mod resample;
 mod signed;
 
 use super::FileError;
 use super::plain::{MAX_MEMORY_BYTES, kind_by_start, open_file};
 use crate::provenance::Provenance;
-use ::image::imageops::{self, FilterType};
-use ::image::metadata::Orientation;
-use ::image::{
-    ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, ImageReader,
-    Limits, Luma, RgbImage,
-};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Seek};
 use std::path::{Path, PathBuf};
 
+use encoded::{Encoded, Kind, Unread};
+
+pub use canvas::Canvas;
 pub use labelled::{Placed, encode_labelled};
+pub use resample::{Filter, resample};
 pub use signed::provenance_of;
 pub use signed::sign;
 
@@ -50,11 +51,8 @@ pub struct Reflectance {
 /// # Errors
 /// [`FileError`], one line that names file, what was found and what was expected.
 pub fn read_reflectance(path: &Path) -> Result<Reflectance, FileError> {
-    let picture = decode(path, |_| Ok(()))?;
-    let (width, height) = (picture.width(), picture.height());
-    let edge = width.min(height);
-    let corner = ((width - edge) / 2, (height - edge) / 2);
-    Ok(Reflectance { size_px: edge as usize, values: grey_of(&picture, corner, (edge, edge)) })
+    let square = read_grey(path)?.central_square();
+    Ok(Reflectance { size_px: square.width as usize, values: square.values })
 }
 
 /// A grey picture in `[0, 1]`.
@@ -78,7 +76,7 @@ pub fn read_grey(path: &Path) -> Result<Grey, FileError> {
 }
 
 /// As [`read_grey`], for a caller that needs pictures of a certain size: `fits` judges width and height, in pixels,
-/// before the pixels are decoded.
+/// before the pixels are decoded. The header also says how much memory the pixels and their grey levels will take.
 ///
 /// # Errors
 /// As [`read_grey`], and the errors of `fits`.
@@ -86,8 +84,45 @@ pub fn read_grey_if<E: From<FileError>>(
     path: &Path,
     fits: impl FnOnce((u32, u32)) -> Result<(), E>,
 ) -> Result<Grey, E> {
-    let picture = decode(path, fits)?;
-    Ok(Grey { width: picture.width(), height: picture.height(), values: grey(&picture) })
+    let (file, _) = open_file(path, EXPECTED)?;
+    let read = |error| FileError::io(path, "read", error);
+    let mut stream = BufReader::new(file);
+    let start = stream.fill_buf().map_err(read)?;
+    let Some(kind) = Kind::by_start(start) else {
+        // The signature goes on behind what names the kind.
+        let found = match start.starts_with(b"\x89PNG") {
+            true => "a PNG image with a damaged signature",
+            false => kind_by_start(start),
+        };
+        return Err(FileError::kind(path, found, EXPECTED).into());
+    };
+    let labels = match kind {
+        Kind::Png => labelled::labels_of(&mut stream),
+        Kind::Jpeg => None,
+    };
+    stream.rewind().map_err(read)?;
+    let wrong = |(found, expected): (String, &'static str)| FileError::kind(path, found, expected);
+    let labels = labels.transpose().map_err(|e| wrong((format!("labels: {e}"), EXPECTED)))?;
+
+    let unread = |error: Unread| match error {
+        Unread::TooLarge => too_large(path, None),
+        Unread::Damaged(found) => FileError::damaged(path, found, EXPECTED),
+    };
+    let encoded = Encoded::open(stream, kind, MAX_MEMORY_BYTES).map_err(unread)?;
+    let (width, height) = encoded.size();
+    let grey_bytes = u64::from(width) * u64::from(height) * size_of::<f32>() as u64;
+    if encoded.decoded_bytes().saturating_add(grey_bytes) > MAX_MEMORY_BYTES {
+        return Err(too_large(path, Some((width, height))).into());
+    }
+    // The image in a picture with labels is smaller.
+    if labels.is_none() {
+        fits((width, height))?;
+    }
+    let picture = encoded.grey().map_err(unread)?;
+    match labels {
+        None => Ok(picture),
+        Some(labels) => Ok(labelled::image_in(&picture, &labels).map_err(wrong)?),
+    }
 }
 
 impl Grey {
@@ -98,81 +133,44 @@ impl Grey {
     /// If `side_px` is 0.
     #[must_use]
     pub fn resized(&self, side_px: u32) -> Self {
-        assert!(side_px > 0, "a picture of 0 pixels");
+        self.central_square().scaled((side_px, side_px), Filter::Triangle)
+    }
+
+    /// The picture's central square.
+    fn central_square(&self) -> Self {
         let edge = self.width.min(self.height);
-        let picture: ImageBuffer<Luma<f32>, _> =
-            ImageBuffer::from_raw(self.width, self.height, self.values.clone())
-                .expect("as many values as pixels");
-        let (left, top) = ((self.width - edge) / 2, (self.height - edge) / 2);
-        let square = imageops::crop_imm(&picture, left, top, edge, edge).to_image();
-        let scaled = imageops::resize(&square, side_px, side_px, FilterType::Triangle);
-        let values = scaled.into_raw().into_iter().map(|value| value.clamp(0.0, 1.0)).collect();
-        Self { width: side_px, height: side_px, values }
+        self.part(((self.width - edge) / 2, (self.height - edge) / 2), (edge, edge))
     }
-}
 
-/// Decodes a picture. Its header says how much memory its pixels and their grey levels take, and `fits` may refuse its
-/// size; both are judged before a pixel is decoded.
-fn decode<E: From<FileError>>(
-    path: &Path,
-    fits: impl FnOnce((u32, u32)) -> Result<(), E>,
-) -> Result<DynamicImage, E> {
-    let (file, _) = open_file(path, EXPECTED)?;
-    let read = |error| FileError::io(path, "read", error);
-    let mut stream = BufReader::new(file);
-    let start = stream.fill_buf().map_err(read)?;
-    let format = ::image::guess_format(start).ok();
-    let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = format else {
-        // The signature goes on behind what names the kind.
-        let found = match start.starts_with(b"\x89PNG") {
-            true => "a PNG image with a damaged signature",
-            false => kind_by_start(start),
-        };
-        return Err(FileError::kind(path, found, EXPECTED).into());
-    };
-    stream.rewind().map_err(read)?;
-    let labels = match format {
-        ImageFormat::Png => labelled::labels_of(&mut stream),
-        _ => None,
-    };
-    stream.rewind().map_err(read)?;
-    let wrong = |(found, expected): (String, &'static str)| FileError::kind(path, found, expected);
-    let labels = labels.transpose().map_err(|e| wrong((format!("labels: {e}"), EXPECTED)))?;
+    /// A part of the picture.
+    ///
+    /// # Panics
+    /// If the part does not lie inside of the picture, or has no pixel.
+    #[must_use]
+    pub fn part(&self, (left, top): (u32, u32), (width, height): (u32, u32)) -> Self {
+        assert!(left + width <= self.width && width * height > 0, "a part of {width} x {height}");
+        let row = |y| &self.values[(y * self.width + left) as usize..][..width as usize];
+        Self { width, height, values: (top..top + height).flat_map(row).copied().collect() }
+    }
 
-    let damaged = |error: ImageError| match error {
-        ImageError::Limits(_) => too_large(path, None),
-        error => FileError::damaged(path, error.to_string(), EXPECTED),
-    };
-    let mut reader = ImageReader::with_format(stream, format);
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(MAX_MEMORY_BYTES);
-    reader.limits(limits);
-    let mut decoder = reader.into_decoder().map_err(damaged)?;
-    // A phone stores the picture as its sensor was held, and the file states which side is up.
-    let orientation = decoder.orientation().map_err(damaged)?;
-    let (width, height) = match (decoder.dimensions(), orientation) {
-        (
-            (width, height),
-            Orientation::Rotate90
-            | Orientation::Rotate270
-            | Orientation::Rotate90FlipH
-            | Orientation::Rotate270FlipH,
-        ) => (height, width),
-        (stored, _) => stored,
-    };
-    let grey_bytes = u64::from(width) * u64::from(height) * size_of::<f32>() as u64;
-    if decoder.total_bytes().saturating_add(grey_bytes) > MAX_MEMORY_BYTES {
-        return Err(too_large(path, Some((width, height))).into());
+    /// The picture with so many columns and rows. Values stay in `[0, 1]`.
+    ///
+    /// # Panics
+    /// If a side is 0.
+    #[must_use]
+    pub fn scaled(&self, size: (u32, u32), filter: Filter) -> Self {
+        let mut values = resample(&self.values, (self.width, self.height), size, filter);
+        values.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+        Self { width: size.0, height: size.1, values }
     }
-    // The image in a picture with labels is smaller.
-    if labels.is_none() {
-        fits((width, height))?;
-    }
-    let mut picture = DynamicImage::from_decoder(decoder).map_err(damaged)?;
-    picture.apply_orientation(orientation);
-    match labels {
-        None => Ok(picture),
-        Some(labels) => Ok(labelled::image_in(&picture, &labels).map_err(wrong)?),
+
+    /// One pixel's value.
+    ///
+    /// # Panics
+    /// Outside of the picture.
+    #[must_use]
+    pub fn value(&self, x: u32, y: u32) -> f32 {
+        self.values[(y * self.width + x) as usize]
     }
 }
 
@@ -211,29 +209,6 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     Ok(files)
 }
 
-/// The picture's grey levels, 0 to 1.
-fn grey(picture: &DynamicImage) -> Vec<f32> {
-    grey_of(picture, (0, 0), (picture.width(), picture.height()))
-}
-
-/// The grey levels of a part of the picture, 0 to 1. Colour is converted line by line, because 16
-/// bytes a pixel of a whole picture are far more than its file.
-fn grey_of(picture: &DynamicImage, corner: (u32, u32), size: (u32, u32)) -> Vec<f32> {
-    let mut levels = Vec::with_capacity(size.0 as usize * size.1 as usize);
-    for row in 0..size.1 {
-        let line = picture.crop_imm(corner.0, corner.1 + row, size.0, 1);
-        match line.color() {
-            // A grey picture is converted directly, because a conversion through colour would round.
-            ColorType::L8 | ColorType::L16 => levels.extend(line.to_luma32f().into_raw()),
-            _ => levels.extend(line.to_rgba32f().pixels().map(|pixel| {
-                let [r, g, b, alpha] = pixel.0;
-                ((0.2126 * r + 0.7152 * g + 0.0722 * b) * alpha).clamp(0.0, 1.0)
-            })),
-        }
-    }
-    levels
-}
-
 /// The bytes of an 8-bit grey PNG of values in `[0, 1]`, row-major, with their provenance. Values outside the range are
 /// clipped; NaN becomes black.
 ///
@@ -260,17 +235,13 @@ pub fn encode_grey(
 /// # Panics
 /// If the picture has no pixel.
 #[must_use]
-pub fn encode_rgb(picture: &RgbImage, provenance: &Provenance) -> Vec<u8> {
+pub fn encode_rgb(picture: &Canvas, provenance: &Provenance) -> Vec<u8> {
     encode_colours(picture, &[], provenance)
 }
 
 /// The bytes of a colour PNG with more text chunks. A picture of few colours has a palette: its file
 /// is a third smaller.
-fn encode_colours(
-    picture: &RgbImage,
-    texts: &[(&str, String)],
-    provenance: &Provenance,
-) -> Vec<u8> {
+fn encode_colours(picture: &Canvas, texts: &[(&str, String)], provenance: &Provenance) -> Vec<u8> {
     written((picture.width(), picture.height()), provenance, |encoder| {
         for (key, text) in texts {
             encoder.add_text_chunk((*key).to_owned(), text.clone())?;
@@ -284,7 +255,7 @@ fn encode_colours(
             }
             None => {
                 encoder.set_color(png::ColorType::Rgb);
-                Ok(picture.as_raw().into())
+                Ok(picture.pixels().as_flattened().into())
             }
         }
     })
@@ -292,10 +263,10 @@ fn encode_colours(
 
 /// The colours of a picture, three bytes each, and the number of each pixel's colour; `None` for a
 /// picture of more than 256 colours.
-fn indexed(picture: &RgbImage) -> Option<(Vec<u8>, Vec<u8>)> {
+fn indexed(picture: &Canvas) -> Option<(Vec<u8>, Vec<u8>)> {
     let mut numbers = HashMap::new();
     let mut palette = Vec::new();
-    let colours = picture.as_raw().as_chunks::<3>().0;
+    let colours = picture.pixels();
     let mut pixels = Vec::with_capacity(colours.len());
     // Most pixels have the colour of the one before.
     for run in colours.chunk_by(|a, b| a == b) {

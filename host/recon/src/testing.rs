@@ -3,6 +3,7 @@
 use crate::{Image, Measurements, Rows, Shape, Side, fwht};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use std::io::Read as _;
 use std::path::PathBuf;
 
 pub(crate) fn side(n: u64) -> Side {
@@ -152,7 +153,38 @@ pub(crate) fn real_data(name: &str) -> Option<Npz> {
 }
 
 /// One array of such a file, row-major.
-pub(crate) fn array<T: npyz::Deserialize>(archive: &mut Npz, name: &str) -> Vec<T> {
-    let member = archive.by_name(&format!("{name}.npy")).unwrap();
-    npyz::NpyFile::new(member).unwrap().into_vec().unwrap()
+pub(crate) fn array<T: Number>(archive: &mut Npz, name: &str) -> Vec<T> {
+    let mut bytes = Vec::new();
+    archive.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+    numbers(&bytes)
+}
+
+/// A number of eight bytes or fewer, as NumPy writes it.
+pub(crate) trait Number {
+    /// Its NumPy type.
+    const TYPE: &str;
+    /// From its bytes, of which there are as many as the type says.
+    fn from_bytes(bytes: &[u8]) -> Self;
+}
+
+macro_rules! number {
+    ($($of:ty, $name:literal;)*) => {$(
+        impl Number for $of {
+            const TYPE: &str = $name;
+            fn from_bytes(bytes: &[u8]) -> Self {
+                Self::from_le_bytes(bytes.try_into().unwrap())
+            }
+        }
+    )*};
+}
+
+number! { f32, "<f4"; f64, "<f8"; i32, "<i4"; }
+
+/// The numbers of a NumPy file, version 1 of the format, row-major. The readers of nirspi-files
+/// stand on this crate.
+pub(crate) fn numbers<T: Number>(npy: &[u8]) -> Vec<T> {
+    let start = 10 + usize::from(u16::from_le_bytes([npy[8], npy[9]]));
+    let header = str::from_utf8(&npy[10..start]).unwrap();
+    assert!(header.contains(&format!("'descr': '{}', 'fortran_order': False", T::TYPE)));
+    npy[start..].chunks_exact(size_of::<T>()).map(T::from_bytes).collect()
 }

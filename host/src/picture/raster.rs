@@ -7,15 +7,14 @@
 use super::drawing::{Drawing, Shape};
 use super::look::Colour;
 use super::text::{Font, height_of, placed_glyphs};
+use crate::files::image::{Canvas, Filter, resample};
 use ab_glyph::{Font as _, ScaleFont as _, point};
-use image::imageops::{self, FilterType};
-use image::{ImageBuffer, Luma, Rgb, RgbImage};
 
 impl Drawing {
     /// The drawing as an image.
     #[must_use]
-    pub fn raster(&self) -> RgbImage {
-        let mut canvas = RgbImage::from_pixel(self.width, self.height, Rgb(self.ground));
+    pub fn raster(&self) -> Canvas {
+        let mut canvas = Canvas::new(self.width, self.height, self.ground);
         for shape in &self.shapes {
             match shape {
                 Shape::Box { at, colour } => fill(&mut canvas, *at, *colour),
@@ -42,12 +41,25 @@ impl Drawing {
 /// Steps from the ground to the ink. Few steps make few colours, and smaller files.
 const STEPS: f64 = 16.0;
 
-fn blend(ground: &mut Rgb<u8>, ink: Colour, coverage: f64) {
+fn blend(ground: &mut Colour, ink: Colour, coverage: f64) {
     let coverage = (coverage * STEPS).round() / STEPS;
-    for (ground, ink) in ground.0.iter_mut().zip(ink) {
+    for (ground, ink) in ground.iter_mut().zip(ink) {
         let mixed =
             f64::from(*ground) + (f64::from(ink) - f64::from(*ground)) * coverage.clamp(0.0, 1.0);
         *ground = mixed.round() as u8;
+    }
+}
+
+/// Mixes one pixel with ink. Outside of the picture there is nothing to draw on.
+fn mix(canvas: &mut Canvas, x: u32, y: u32, ink: Colour, coverage: f64) {
+    if let Some(pixel) = canvas.pixel_mut(x, y) {
+        blend(pixel, ink, coverage);
+    }
+}
+
+fn put(canvas: &mut Canvas, x: u32, y: u32, colour: Colour) {
+    if let Some(pixel) = canvas.pixel_mut(x, y) {
+        *pixel = colour;
     }
 }
 
@@ -57,11 +69,11 @@ fn within(from: f64, to: f64, length: u32) -> std::ops::Range<u32> {
     bounded(from.floor())..bounded(to.ceil())
 }
 
-fn fill(canvas: &mut RgbImage, [left, top, wide, high]: [f64; 4], colour: Colour) {
+fn fill(canvas: &mut Canvas, [left, top, wide, high]: [f64; 4], colour: Colour) {
     let whole = |v: f64| v.round();
     for y in within(whole(top), whole(top + high), canvas.height()) {
         for x in within(whole(left), whole(left + wide), canvas.width()) {
-            canvas.put_pixel(x, y, Rgb(colour));
+            put(canvas, x, y, colour);
         }
     }
 }
@@ -69,7 +81,7 @@ fn fill(canvas: &mut RgbImage, [left, top, wide, high]: [f64; 4], colour: Colour
 /// Draws a line with this pattern of dashes; solid without any. `along` is the position in the
 /// pattern at the start; the result is the position at the end.
 fn dashed(
-    canvas: &mut RgbImage,
+    canvas: &mut Canvas,
     (from, to): ((f64, f64), (f64, f64)),
     ink: (f64, Colour),
     pattern: &[f64],
@@ -100,7 +112,7 @@ fn dashed(
 }
 
 /// Draws a straight line of some width.
-fn stroke(canvas: &mut RgbImage, from: (f64, f64), to: (f64, f64), (width, colour): (f64, Colour)) {
+fn stroke(canvas: &mut Canvas, from: (f64, f64), to: (f64, f64), (width, colour): (f64, Colour)) {
     let length = (to.0 - from.0).hypot(to.1 - from.1);
     if !length.is_finite() || length > 1e5 {
         return;
@@ -120,14 +132,14 @@ fn stroke(canvas: &mut RgbImage, from: (f64, f64), to: (f64, f64), (width, colou
             let off = (px - along * dx).hypot(py - along * dy);
             let cover = (half + 0.5 - off).clamp(0.0, 1.0);
             if cover > 0.0 {
-                blend(canvas.get_pixel_mut(x, y), colour, cover);
+                mix(canvas, x, y, colour, cover);
             }
         }
     }
 }
 
 /// Fills the inside of an outline; each pixel is asked at 4 x 4 places.
-fn area(canvas: &mut RgbImage, corners: &[(f64, f64)], colour: Colour) {
+fn area(canvas: &mut Canvas, corners: &[(f64, f64)], colour: Colour) {
     const ASKED: u32 = 4;
     let ends = |of: fn(&(f64, f64)) -> f64| {
         let values = corners.iter().map(of);
@@ -148,12 +160,12 @@ fn area(canvas: &mut RgbImage, corners: &[(f64, f64)], colour: Colour) {
             let (fx, fy) = (f64::from(x), f64::from(y));
             let inside = asked.filter(|(dx, dy)| is_inside(fx + dx, fy + dy)).count();
             let cover = inside as f64 / f64::from(ASKED * ASKED);
-            blend(canvas.get_pixel_mut(x, y), colour, cover);
+            mix(canvas, x, y, colour, cover);
         }
     }
 }
 
-fn glyphs(canvas: &mut RgbImage, text: &str, (x, baseline): (f32, f32), size: f32, colour: Colour) {
+fn glyphs(canvas: &mut Canvas, text: &str, (x, baseline): (f32, f32), size: f32, colour: Colour) {
     let height = height_of(size);
     let font = Font::sans().as_scaled(height);
     let mut pen = x;
@@ -166,31 +178,26 @@ fn glyphs(canvas: &mut RgbImage, text: &str, (x, baseline): (f32, f32), size: f3
         outlined.draw(|dx, dy, coverage| {
             let (x, y) = (bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy));
             let (Ok(x), Ok(y)) = (u32::try_from(x), u32::try_from(y)) else { return };
-            if let Some(pixel) = canvas.get_pixel_mut_checked(x, y) {
-                blend(pixel, colour, f64::from(coverage));
-            }
+            mix(canvas, x, y, colour, f64::from(coverage));
         });
     }
 }
 
 fn grey(
-    canvas: &mut RgbImage,
+    canvas: &mut Canvas,
     [left, top, wide, high]: [u32; 4],
     columns: u32,
     levels: &[u8],
     smooth: bool,
 ) {
     let rows = levels.len() as u32 / columns;
-    let mut put = |x: u32, y: u32, level: u8| {
-        if let Some(pixel) = canvas.get_pixel_mut_checked(left + x, top + y) {
-            *pixel = Rgb([level; 3]);
-        }
-    };
+    let mut put = |x: u32, y: u32, level: u8| put(canvas, left + x, top + y, [level; 3]);
     if smooth {
-        let image: ImageBuffer<Luma<u8>, _> = ImageBuffer::from_raw(columns, rows, levels.to_vec())
-            .expect("the levels are whole rows");
-        let shown = imageops::resize(&image, wide, high, FilterType::Triangle);
-        shown.enumerate_pixels().for_each(|(x, y, Luma([level]))| put(x, y, *level));
+        let levels: Vec<f32> = levels.iter().map(|&level| level.into()).collect();
+        let shown = resample(&levels, (columns, rows), (wide, high), Filter::Triangle);
+        for (level, at) in shown.into_iter().zip(0..) {
+            put(at % wide, at / wide, level.round() as u8);
+        }
         return;
     }
     for y in 0..high {
@@ -212,7 +219,7 @@ mod tests {
         let corners = vec![(2.0, 6.0), (4.0, 6.0), (4.0, 8.5), (2.0, 8.5)];
         drawing.shapes.push(Shape::Area { corners, colour: [0, 0, 0] });
         let canvas = drawing.raster();
-        let column: Vec<u8> = (0..9).map(|y| canvas.get_pixel(3, y).0[0]).collect();
+        let column: Vec<u8> = (0..9).map(|y| canvas.pixel(3, y).unwrap()[0]).collect();
         assert_eq!(column, [255, 255, 255, 128, 0, 128, 0, 0, 128]);
     }
 }

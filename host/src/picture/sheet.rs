@@ -409,9 +409,9 @@ mod tests {
         assert!(wide == high && wide.is_multiple_of(4), "{wide} x {high}");
         assert_eq!((levels[0], levels[15]), (0, 255));
         let canvas = drawing.raster();
-        let warned = image::Rgb(look.palette.warning);
-        assert_eq!(*canvas.get_pixel(left - 1, top), warned);
-        assert_ne!(warned.0, look.palette.frame);
+        let warned = look.palette.warning;
+        assert_eq!(canvas.pixel(left - 1, top), Some(&warned));
+        assert_ne!(warned, look.palette.frame);
     }
 
     #[test]

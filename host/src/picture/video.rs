@@ -10,9 +10,8 @@ use super::look::{FigureStyle, Look};
 use super::scale::{Range, Unit};
 use super::sheet::{MOST_BESIDE, Sheet, evenly};
 use super::signature::signed;
-use crate::files::image::sign;
+use crate::files::image::{Canvas, sign};
 use crate::provenance::Provenance;
-use image::{GenericImageView, RgbImage};
 use nirspi_recon::{Image, Shape};
 use rayon::prelude::*;
 
@@ -52,7 +51,7 @@ fn encode(sheet: &Sheet<'_>, most: usize, style: FigureStyle, provenance: &Prove
         };
         let together = |some: &[Drawing]| some.par_iter().map(drawn).collect::<Vec<_>>();
         let mut pictures = pictures.chunks(TOGETHER).flat_map(together);
-        let mut before = pictures.next().unwrap_or_else(|| RgbImage::new(1, 1));
+        let mut before = pictures.next().unwrap_or_else(|| Canvas::new(1, 1, [0; 3]));
         let mut encoder = png::Encoder::new(&mut bytes, before.width(), before.height());
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
@@ -61,7 +60,7 @@ fn encode(sheet: &Sheet<'_>, most: usize, style: FigureStyle, provenance: &Prove
         encoder.set_frame_delay(1, RATE_HZ)?;
         sign(&mut encoder, provenance)?;
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(before.as_raw())?;
+        writer.write_image_data(before.pixels().as_flattened())?;
         for picture in pictures {
             // A frame is what has changed since the one before.
             let (left, top, width, height) = changed(&before, &picture);
@@ -69,8 +68,8 @@ fn encode(sheet: &Sheet<'_>, most: usize, style: FigureStyle, provenance: &Prove
             writer.reset_frame_position()?;
             writer.set_frame_dimension(width, height)?;
             writer.set_frame_position(left, top)?;
-            let part = picture.view(left, top, width, height).to_image();
-            writer.write_image_data(part.as_raw())?;
+            let part = picture.part((left, top), (width, height));
+            writer.write_image_data(part.pixels().as_flattened())?;
             before = picture;
         }
         writer.finish()
@@ -118,14 +117,14 @@ fn drawn(picture: &SideBySide, look: &Look) -> Drawing {
 }
 
 /// The smallest part that holds all changes, at least a pixel: left, top, width, height.
-fn changed(before: &RgbImage, after: &RgbImage) -> (u32, u32, u32, u32) {
+fn changed(before: &Canvas, after: &Canvas) -> (u32, u32, u32, u32) {
     let (mut left, mut top, mut right, mut bottom) = (u32::MAX, u32::MAX, 0, 0);
-    let wide = 3 * after.width() as usize;
-    let rows = before.as_raw().chunks_exact(wide).zip(after.as_raw().chunks_exact(wide));
+    let wide = after.width() as usize;
+    let rows = before.pixels().chunks_exact(wide).zip(after.pixels().chunks_exact(wide));
     for (y, (old, new)) in rows.enumerate().filter(|(_, (old, new))| old != new) {
         let differs = |x: &usize| old[*x] != new[*x];
-        let first = (0..wide).find(differs).unwrap_or(0) as u32 / 3;
-        let last = (0..wide).rev().find(differs).unwrap_or(0) as u32 / 3;
+        let first = (0..wide).find(differs).unwrap_or(0) as u32;
+        let last = (0..wide).rev().find(differs).unwrap_or(0) as u32;
         (left, right) = (left.min(first), right.max(last));
         (top, bottom) = (top.min(y as u32), y as u32);
     }
@@ -140,8 +139,6 @@ mod tests {
     use super::super::scale::Unit;
     use super::*;
     use crate::testing::provenance;
-    use image::codecs::png::PngDecoder;
-    use image::{AnimationDecoder, DynamicImage};
     use std::io::Cursor;
 
     #[test]
@@ -155,17 +152,26 @@ mod tests {
         let sheet = Sheet::new(String::new(), (8, 8), images, Unit::AdcCounts);
         let video = encode(&sheet, MOST, FigureStyle::Paper, &provenance());
         assert_eq!(video.frames, 4);
-        let frames = PngDecoder::new(Cursor::new(&video.bytes)).unwrap().apng().unwrap();
-        let frames = frames.into_frames().collect_frames().unwrap();
-        assert_eq!(frames.len(), 4);
-        for (index, found) in frames.into_iter().enumerate() {
-            assert_eq!(found.delay().numer_denom_ms(), (100, 1));
+        let mut reader = png::Decoder::new(Cursor::new(&video.bytes)).read_info().unwrap();
+        let (width, height) = reader.info().size();
+        assert_eq!(reader.info().animation_control.unwrap().num_frames, 4);
+        let mut shown = Canvas::new(width, height, [0; 3]);
+        for index in 0..4 {
+            let mut part = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut part).unwrap();
+            let control = *reader.info().frame_control().unwrap();
+            assert_eq!((control.delay_num, control.delay_den), (1, RATE_HZ));
+            // What has changed is drawn over the frame before.
+            for (pixel, at) in part.as_chunks::<3>().0.iter().zip(0..control.width * control.height)
+            {
+                let (x, y) = (at % control.width, at / control.width);
+                *shown.pixel_mut(control.x_offset + x, control.y_offset + y).unwrap() = *pixel;
+            }
             let wanted = drawn(&frame(&sheet, index), &FigureStyle::Paper.on_screen()).raster();
-            let found = DynamicImage::from(found.into_buffer()).to_rgb8();
-            let (width, height) = wanted.dimensions();
-            let part = found.view(0, 0, width, height).to_image();
-            assert!(found.height() >= height && part == wanted, "frame {index}");
+            let size = (wanted.width(), wanted.height());
+            assert!(height >= size.1 && shown.part((0, 0), size) == wanted, "frame {index}");
         }
+        assert!(reader.next_frame(&mut [0; 1 << 20]).is_err(), "a fifth frame");
     }
 
     #[test]

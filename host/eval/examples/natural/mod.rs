@@ -1,5 +1,6 @@
 //! The natural scenes of `natural/bsds_train.npz`, which several examples read.
 
+use nirspi::files::archive::Archive;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -21,17 +22,13 @@ impl Scenes {
 
     /// Reads the scenes from the folder of data.
     pub fn read(data: &Path) -> Result<Self, Box<dyn Error>> {
-        let file = Self::file(data);
-        let wrong = |what: String| format!("{}: {what}", file.display());
-        let open = std::fs::File::open(&file).map_err(|error| wrong(error.to_string()))?;
-        let mut archive = zip::ZipArchive::new(std::io::BufReader::new(open))?;
-        let member = npyz::NpyFile::new(archive.by_name("x.npy")?)?;
-        let &[_, height, width] = member.shape() else {
-            let found = member.shape();
-            return Err(wrong(format!("x has shape {found:?}, expected (N, height, width)")).into());
-        };
-        let (height, width) = (height as usize, width as usize);
-        Ok(Self { height, width, levels: member.into_vec()? })
+        let mut archive = Archive::open(&Self::file(data))?;
+        let x = archive.numbers_of::<f32>("x", |shape| match shape {
+            [_, _, _] => Ok(()),
+            _ => Err("(N, height, width)".to_owned()),
+        })?;
+        let levels = x.values.into_iter().map(|level| level as u8).collect();
+        Ok(Self { height: x.shape[1], width: x.shape[2], levels })
     }
 
     /// The pixels of each scene.

@@ -1,6 +1,7 @@
 //! The scenes of the table, how each is measured, and what judges it.
 
 use super::natural::Scenes;
+use nirspi::files::npy;
 use nirspi::scene::SceneSource;
 use nirspi::source::{Index, Source, SourceOptions};
 use nirspi_eval::completion::Scene;
@@ -297,8 +298,8 @@ fn natural(data: &Path, noise: f64, first: usize) -> Vec<Measured> {
 fn photon_counts(data: &Path) -> Vec<Measured> {
     let rows = Rows::natural(Side::new(SIDE as u64).unwrap());
     let [short, long] = ["photon_40ms.npy", "photon_80ms.npy"].map(|name| {
-        let bytes = std::fs::read(data.join("spi").join(name)).unwrap();
-        let counts: Vec<f64> = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
+        let counts = npy::read_stack(&data.join("spi").join(name)).unwrap();
+        let counts: Vec<f64> = counts.values.into_iter().map(f64::from).collect();
         Measurements::from_pairs(&rows, &counts).unwrap().measurements
     });
     let (by_long, by_short) = (full_image(&long), full_image(&short));

@@ -6,10 +6,9 @@
 //! # Invariant
 //! Labels are never read as an image (`super::tests::labels_are_never_read_as_an_image`).
 
-use super::encode_colours;
 use super::signed::text_of;
+use super::{Canvas, Grey, encode_colours, to_level};
 use crate::provenance::Provenance;
-use ::image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, Seek};
 
@@ -51,7 +50,7 @@ pub(super) struct Labels {
 /// If the picture has no pixel.
 #[must_use]
 pub fn encode_labelled(
-    picture: &RgbImage,
+    picture: &Canvas,
     images: usize,
     image: Option<Placed>,
     provenance: &Provenance,
@@ -67,13 +66,10 @@ pub(super) fn labels_of(stream: impl BufRead + Seek) -> Option<Result<Labels, se
 }
 
 /// The image in a picture with labels, or what is wrong with the picture: found and expected.
-pub(super) fn image_in(
-    picture: &DynamicImage,
-    labels: &Labels,
-) -> Result<DynamicImage, (String, &'static str)> {
+pub(super) fn image_in(picture: &Grey, labels: &Labels) -> Result<Grey, (String, &'static str)> {
     let Labels { size, images, image } = labels;
     const BESIDE: &str = "one image; the numbers are in the .npy file beside the picture";
-    if *size != [picture.width(), picture.height()] {
+    if *size != [picture.width, picture.height] {
         let found = "a picture with labels that another program has resized";
         return Err((found.to_owned(), BESIDE));
     }
@@ -88,11 +84,12 @@ pub(super) fn image_in(
     if cell == 0 || !fits(left, width, size[0]) || !fits(top, height, size[1]) {
         return Err(("a picture with damaged labels".to_owned(), BESIDE));
     }
-    let grey = picture.to_luma8();
-    let value = |x: u32, y: u32| {
-        let level = grey.get_pixel(left + x * cell + cell / 2, top + y * cell + cell / 2).0[0];
-        let value = black + (white - black) * f32::from(level) / 255.0;
-        Luma([(value.clamp(0.0, 1.0) * 65_535.0).round() as u16])
+    let value = |at: u32| {
+        let (x, y) = (at % width, at / width);
+        let shown = picture.value(left + x * cell + cell / 2, top + y * cell + cell / 2);
+        // The level as it was written, without the rounding of three colours.
+        let level = f32::from(to_level(shown)) / 255.0;
+        (black + (white - black) * level).clamp(0.0, 1.0)
     };
-    Ok(DynamicImage::ImageLuma16(ImageBuffer::from_fn(width, height, value)))
+    Ok(Grey { width, height, values: (0..width * height).map(value).collect() })
 }

@@ -1,13 +1,27 @@
 use super::super::testing::{file, line};
 use super::*;
 use crate::provenance::tests::provenance;
-use ::image::{GrayImage, ImageBuffer, Luma, LumaA, Rgb, Rgba};
+use ::png::{BitDepth, ColorType};
 
-fn png(picture: impl Into<DynamicImage>) -> Vec<u8> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    picture.into().write_to(&mut bytes, ImageFormat::Png).unwrap();
-    bytes.into_inner()
+/// A PNG of so many columns. 16-bit samples come with the high byte first.
+fn png(width: u32, (colour, depth): (ColorType, BitDepth), samples: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let row = colour.samples() * if depth == BitDepth::Sixteen { 2 } else { 1 } * width as usize;
+    let mut encoder = ::png::Encoder::new(&mut bytes, width, (samples.len() / row) as u32);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    encoder.write_header().unwrap().write_image_data(samples).unwrap();
+    bytes
 }
+
+fn grey_png(width: u32, levels: &[u8]) -> Vec<u8> {
+    png(width, (ColorType::Grayscale, BitDepth::Eight), levels)
+}
+
+/// JPEG files that Pillow 13.0 has written: baseline grey, colour in several passes, four inks.
+const SMALL_JPEG: &[u8] = include_bytes!("../small/nine.jpg");
+const PROGRESSIVE_JPEG: &[u8] = include_bytes!("../small/progressive.jpg");
+const FOUR_INKS_JPEG: &[u8] = include_bytes!("../small/cmyk.jpg");
 
 fn read(bytes: &[u8]) -> Result<Reflectance, FileError> {
     let (_guard, path) = file("scene.png", bytes);
@@ -36,13 +50,8 @@ fn values_outside_0_to_1_are_clipped() {
 
 #[test]
 fn colour_becomes_rec_709_luma() {
-    let picture = ImageBuffer::from_fn(2, 2, |x, y| match (x, y) {
-        (0, 0) => Rgb([255u8, 0, 0]),
-        (1, 0) => Rgb([0, 255, 0]),
-        (0, 1) => Rgb([0, 0, 255]),
-        _ => Rgb([255, 255, 255]),
-    });
-    let map = read(&png(picture)).unwrap();
+    let colours = [255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255];
+    let map = read(&png(2, (ColorType::Rgb, BitDepth::Eight), &colours)).unwrap();
     for (found, wanted) in map.values.iter().zip([0.2126, 0.7152, 0.0722, 1.0]) {
         assert!((found - wanted).abs() < 1e-6, "{found} {wanted}");
     }
@@ -51,69 +60,93 @@ fn colour_becomes_rec_709_luma() {
 #[test]
 fn every_kind_of_png_reads_alike() {
     let half = 128.0 / 255.0;
-    let pictures: [DynamicImage; 6] = [
-        ImageBuffer::from_pixel(2, 2, Luma([128u8])).into(),
-        ImageBuffer::from_pixel(2, 2, Luma([128u16 * 257])).into(),
-        ImageBuffer::from_pixel(2, 2, LumaA([128u8, 255])).into(),
-        ImageBuffer::from_pixel(2, 2, Rgb([128u16 * 257; 3])).into(),
-        ImageBuffer::from_pixel(2, 2, Rgba([128u8, 128, 128, 255])).into(),
+    let kinds: [(ColorType, BitDepth, &[u8]); 6] = [
+        (ColorType::Grayscale, BitDepth::Eight, &[128]),
+        (ColorType::Grayscale, BitDepth::Sixteen, &[128; 2]),
+        (ColorType::GrayscaleAlpha, BitDepth::Eight, &[128, 255]),
+        (ColorType::Rgb, BitDepth::Sixteen, &[128; 6]),
+        (ColorType::Rgba, BitDepth::Eight, &[128, 128, 128, 255]),
         // A white pixel at half opacity before a black ground.
-        ImageBuffer::from_pixel(2, 2, Rgba([255u8, 255, 255, 128])).into(),
+        (ColorType::Rgba, BitDepth::Eight, &[255, 255, 255, 128]),
     ];
-    for picture in pictures {
-        let map = read(&png(picture.clone())).unwrap();
-        assert!(
-            map.values.iter().all(|value| (value - half).abs() < 1e-5),
-            "{:?}: {:?}",
-            picture.color(),
-            map.values
-        );
+    for (colour, depth, pixel) in kinds {
+        let map = read(&png(2, (colour, depth), &pixel.repeat(4))).unwrap();
+        let found = &map.values;
+        assert!(found.iter().all(|v| (v - half).abs() < 1e-5), "{colour:?} {depth:?}: {found:?}");
     }
 }
 
 #[test]
 fn a_wide_or_tall_picture_is_cropped_to_its_centre() {
-    let wide = GrayImage::from_fn(7, 3, |x, _| Luma([x as u8]));
-    let map = read(&png(wide)).unwrap();
-    assert_eq!(map.size_px, 3);
-    assert_eq!(
-        map.values.iter().map(|v| (v * 255.0).round()).collect::<Vec<_>>(),
-        [2.0, 3.0, 4.0].repeat(3)
-    );
-    let tall = GrayImage::from_fn(2, 6, |_, y| Luma([y as u8]));
-    let levels: Vec<f32> =
-        read(&png(tall)).unwrap().values.iter().map(|v| (v * 255.0).round()).collect();
-    assert_eq!(levels, [2.0, 2.0, 3.0, 3.0]);
-}
-
-fn jpeg(picture: &GrayImage) -> Vec<u8> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
-    bytes.into_inner()
+    let levels = |bytes: &[u8]| -> Vec<f32> {
+        read(bytes).unwrap().values.iter().map(|v| (v * 255.0).round()).collect()
+    };
+    let wide = grey_png(7, &[0, 1, 2, 3, 4, 5, 6].repeat(3));
+    assert_eq!(levels(&wide), [2.0, 3.0, 4.0].repeat(3));
+    let tall = grey_png(2, &[0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]);
+    assert_eq!(levels(&tall), [2.0, 2.0, 3.0, 3.0]);
 }
 
 #[test]
-fn a_jpeg_is_read_the_way_up_that_it_says() {
-    let picture = GrayImage::from_fn(16, 16, |_, y| Luma([if y < 8 { 200 } else { 40 }]));
-    let upright = jpeg(&picture);
-    let corners = |bytes: &[u8]| {
-        let map = read(bytes).unwrap();
-        assert_eq!(map.size_px, 16);
-        [0, 15, 240, 255].map(|at| (map.values[at] * 255.0).round() as i32)
+fn jpegs_of_every_kind_are_read() {
+    // Red, green, blue, nearly white, 12 x 10 pixels each.
+    for bytes in [PROGRESSIVE_JPEG, FOUR_INKS_JPEG] {
+        let (_guard, path) = file("scene.jpg", bytes);
+        let grey = read_grey(&path).unwrap();
+        assert_eq!((grey.width, grey.height), (24, 20));
+        let found = [(5, 4), (18, 4), (5, 15), (18, 15)].map(|(x, y)| grey.value(x, y));
+        // As Pillow reads them.
+        for (found, expected) in found.iter().zip([0.276, 0.596, 0.202, 0.941]) {
+            assert!((found - expected).abs() < 0.01, "{found} {expected}");
+        }
+    }
+}
+
+/// The number of the side that is up, as a camera writes it: Exif, in either order of bytes.
+fn turned(jpeg: &[u8], number: u8, is_big: bool) -> Vec<u8> {
+    let exif: Vec<u8> = match is_big {
+        true => [
+            b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".as_slice(),
+            &[number, 0, 0, 0, 0, 0, 0],
+        ]
+        .concat(),
+        false => [
+            b"Exif\0\0II\x2a\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".as_slice(),
+            &[number, 0, 0, 0, 0, 0, 0, 0],
+        ]
+        .concat(),
     };
-    let near = |found: [i32; 4], expected: [i32; 4]| {
-        assert!(
-            found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 12),
-            "{found:?} {expected:?}"
-        );
-    };
-    near(corners(&upright), [200, 200, 40, 40]);
-    // Exif orientation 6: the top of the scene is the stored picture's left side, turned a quarter
-    // clockwise.
-    let exif = b"Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
     let length = u16::try_from(exif.len() + 2).unwrap().to_be_bytes();
-    let turned = [&upright[..2], &[0xff, 0xe1], &length, exif, &upright[2..]].concat();
-    near(corners(&turned), [40, 200, 40, 200]);
+    [&jpeg[..2], &[0xff, 0xe1], &length, &exif, &jpeg[2..]].concat()
+}
+
+#[test]
+fn a_picture_is_read_the_way_up_that_it_says() {
+    let corners = |bytes: &[u8]| {
+        let (_guard, path) = file("scene.jpg", bytes);
+        let grey = read_grey(&path).unwrap();
+        let (right, bottom) = (grey.width - 1, grey.height - 1);
+        let corners = [(0, 0), (right, 0), (0, bottom), (right, bottom)];
+        let level = |(x, y)| {
+            ['b', 'r', 'g', 'w']
+                [[0.24, 0.44, 0.77].partition_point(|limit| grey.value(x, y) > *limit)]
+        };
+        (grey.width, corners.map(level).into_iter().collect::<String>())
+    };
+    // Stored: red and green above blue and white, 24 columns.
+    let upright = ["rgbw", "rgbw", "grwb", "wbgr", "bwrg", "rbgw", "brwg", "wgbr", "gwrb"];
+    for (number, expected) in (0..).zip(upright) {
+        for is_big in [true, false] {
+            let (width, found) = corners(&turned(PROGRESSIVE_JPEG, number, is_big));
+            assert_eq!(found, expected, "Exif orientation {number}");
+            assert_eq!(width, if number > 4 { 20 } else { 24 });
+        }
+    }
+    // A number that Exif does not have, and Exif that ends early.
+    assert_eq!(corners(&turned(PROGRESSIVE_JPEG, 9, true)).1, "rgbw");
+    let mut short = turned(PROGRESSIVE_JPEG, 6, true);
+    short[25] = 200;
+    assert_eq!(corners(&short).1, "rgbw");
 }
 
 #[test]
@@ -128,7 +161,7 @@ fn a_resized_picture_is_the_mean_of_its_central_square() {
 
 #[test]
 fn each_kind_of_bad_picture_gets_its_line() {
-    let whole = png(GrayImage::new(20, 20));
+    let whole = grey_png(20, &[0; 400]);
     let mut huge = whole.clone();
     huge[16..20].copy_from_slice(&100_000u32.to_be_bytes());
     let cases: [(&[u8], &str); 6] = [
@@ -147,10 +180,9 @@ fn each_kind_of_bad_picture_gets_its_line() {
 
 #[test]
 fn no_damage_makes_the_reader_panic() {
-    let picture = GrayImage::from_fn(9, 9, |x, y| Luma([(x * y) as u8]));
-    for whole in [jpeg(&picture), png(picture)] {
-        no_damage_panics(&whole);
-    }
+    let levels: Vec<u8> = (0..81).map(|at| at / 9 * (at % 9)).collect();
+    no_damage_panics(SMALL_JPEG);
+    no_damage_panics(&grey_png(9, &levels));
 }
 
 fn no_damage_panics(whole: &[u8]) {
@@ -172,7 +204,7 @@ fn no_damage_panics(whole: &[u8]) {
 fn damaged_labels_are_never_read_as_an_image() {
     // Another program has resized the picture and kept its text.
     let placed = Placed { left: 0, top: 0, cell: 1, width: 2, height: 2, black: 0.0, white: 1.0 };
-    let picture = RgbImage::new(4, 4);
+    let picture = Canvas::new(4, 4, [0; 3]);
     for damaged in [
         Placed { cell: 0, ..placed },
         Placed { left: 3, ..placed },
@@ -250,12 +282,23 @@ fn a_picture_of_a_wrong_size_is_refused_before_a_pixel_is_decoded() {
 
 #[test]
 fn a_picture_of_few_colours_is_smaller_and_the_same() {
-    let few = RgbImage::from_fn(300, 200, |x, y| Rgb([(x / 3) as u8, 7, (y % 2) as u8]));
-    let many = RgbImage::from_fn(300, 200, |x, y| Rgb([x as u8, y as u8, (x * y) as u8]));
-    for (picture, color) in [(few, png::ColorType::Indexed), (many, png::ColorType::Rgb)] {
+    let drawn = |colour: fn(u32, u32) -> [u8; 3]| {
+        let mut canvas = Canvas::new(300, 200, [0; 3]);
+        for (at, pixel) in (0..).zip(canvas.pixels_mut()) {
+            *pixel = colour(at % 300, at / 300);
+        }
+        canvas
+    };
+    let few = drawn(|x, y| [(x / 3) as u8, 7, (y % 2) as u8]);
+    let many = drawn(|x, y| [x as u8, y as u8, (x * y) as u8]);
+    for (picture, color) in [(few, ColorType::Indexed), (many, ColorType::Rgb)] {
         let bytes = encode_rgb(&picture, &provenance());
-        let header = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
-        assert_eq!(header.info().color_type, color);
-        assert_eq!(image::load_from_memory(&bytes).unwrap().to_rgb8(), picture);
+        let mut decoder = ::png::Decoder::new(std::io::Cursor::new(&bytes));
+        decoder.set_transformations(::png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().unwrap();
+        assert_eq!(reader.info().color_type, color);
+        let mut read = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut read).unwrap();
+        assert_eq!(read, picture.pixels().as_flattened());
     }
 }

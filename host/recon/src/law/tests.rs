@@ -1,6 +1,6 @@
 use super::*;
 use crate::law::repeats::averaged;
-use crate::testing::{Noise, array, correlation_of, readings, real_data, scene, side};
+use crate::testing::{Noise, array, correlation_of, numbers, readings, real_data, scene, side};
 use crate::{Order, reconstruct};
 use proptest::prelude::*;
 
@@ -232,7 +232,7 @@ fn a_lamp_that_drifts_is_told_where_it_limits_and_sums_correct_it() {
 fn photons(name: &str) -> Option<Vec<f64>> {
     let folder = std::env::var_os("NIRSPI_DATA").map(std::path::PathBuf::from)?;
     let bytes = std::fs::read(folder.join("spi").join(name)).ok()?;
-    Some(npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap())
+    Some(numbers(&bytes))
 }
 
 /// Recordings of which the all-on pattern comes first, with their names.

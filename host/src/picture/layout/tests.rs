@@ -149,8 +149,8 @@ fn pixels_of_the_camera_stay_square_and_unmixed() {
         for column in 0..32 {
             let level = to_level((row * 32 + column) as f32 / 1023.0);
             for (dx, dy) in [(0, 0), (cell - 1, 0), (0, cell - 1), (cell - 1, cell - 1)] {
-                let found = canvas.get_pixel(left + column * cell + dx, top + row * cell + dy);
-                assert_eq!(found.0, [level; 3], "{row} {column} {dx} {dy}");
+                let found = canvas.pixel(left + column * cell + dx, top + row * cell + dy);
+                assert_eq!(found, Some(&[level; 3]), "{row} {column} {dx} {dy}");
             }
         }
     }

@@ -1,17 +1,19 @@
 //! PNG and JPEG.
 
 use crate::{Law, MIB, place, read};
-use image::codecs::jpeg::JpegEncoder;
-use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageFormat, RgbImage};
 use nirspi::files::image::{encode_grey, is_picture, read_grey, read_reflectance, to_level};
 use nirspi_wire::crc32;
-use std::io::Cursor;
+use png::{BitDepth, ColorType};
 
 pub const LAWS: &[Law] = &[
     Law {
         name: "png",
         reads: "a PNG, the checksums of its chunks right or as they come",
-        readers: &["host/files/src/image.rs", "host/files/src/image/labelled.rs"],
+        readers: &[
+            "host/files/src/image.rs",
+            "host/files/src/image/encoded.rs",
+            "host/files/src/image/labelled.rs",
+        ],
         holds: png,
         seeds: png_seeds,
         longest: 2048,
@@ -20,7 +22,7 @@ pub const LAWS: &[Law] = &[
     Law {
         name: "jpeg",
         reads: "a JPEG, with its note which side is up",
-        readers: &["host/files/src/image.rs"],
+        readers: &["host/files/src/image.rs", "host/files/src/image/encoded.rs"],
         holds: picture,
         seeds: jpeg_seeds,
         longest: 2048,
@@ -78,33 +80,36 @@ fn picture(bytes: &[u8]) {
     }
 }
 
-fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, format).expect("memory");
-    bytes.into_inner()
-}
-
 fn png_seeds() -> Vec<Vec<u8>> {
-    let grey = GrayImage::from_fn(5, 4, |x, y| image::Luma([(x * 50 + y * 9) as u8]));
-    let colours = RgbImage::from_fn(4, 3, |x, y| image::Rgb([x as u8 * 60, y as u8 * 80, 7]));
-    let clear = GrayAlphaImage::from_fn(3, 3, |x, y| image::LumaA([200, (x * 80 + y) as u8]));
-    let deep = DynamicImage::from(grey.clone()).into_luma16();
-    let all: [DynamicImage; 4] = [grey.into(), colours.into(), clear.into(), deep.into()];
-    let mut all: Vec<Vec<u8>> = all.iter().map(|one| encoded(one, ImageFormat::Png)).collect();
-    all.push(encode_grey(8, 8, &[0.25; 64], &provenance()));
-    all
+    let encoded = |(colour, depth, width, row): (ColorType, BitDepth, u32, usize)| {
+        let mut bytes = Vec::new();
+        let samples: Vec<u8> = (0..4 * row).map(|at| (at * 23) as u8).collect();
+        let mut encoder = png::Encoder::new(&mut bytes, width, 4);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        let writer = encoder.write_header();
+        writer.and_then(|mut writer| writer.write_image_data(&samples)).expect("memory");
+        bytes
+    };
+    // Columns, and bytes of a row.
+    let kinds = [
+        (ColorType::Grayscale, BitDepth::Eight, 5, 5),
+        (ColorType::Rgb, BitDepth::Eight, 4, 12),
+        (ColorType::GrayscaleAlpha, BitDepth::Eight, 3, 6),
+        (ColorType::Grayscale, BitDepth::Sixteen, 5, 10),
+    ];
+    let ours = encode_grey(8, 8, &[0.25; 64], &provenance());
+    kinds.into_iter().map(encoded).chain([ours]).collect()
 }
 
 fn jpeg_seeds() -> Vec<Vec<u8>> {
-    let grey = GrayImage::from_fn(9, 6, |x, y| image::Luma([(x * 20 + y * 9) as u8]));
-    let colours = RgbImage::from_fn(8, 8, |x, y| image::Rgb([x as u8 * 30, y as u8 * 30, 7]));
-    let mut rough = Vec::new();
-    JpegEncoder::new_with_quality(&mut rough, 20).encode_image(&grey).expect("memory");
+    let grey = include_bytes!("../../../../host/files/src/small/nine.jpg").as_slice();
+    let passes = include_bytes!("../../../../host/files/src/small/progressive.jpg").as_slice();
+    let inks = include_bytes!("../../../../host/files/src/small/cmyk.jpg").as_slice();
     // Exif with one entry: the picture lies on its side.
     let exif = b"\xff\xe1\x00\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
-    let turned = [&rough[..2], exif, &rough[2..]].concat();
-    let colours = encoded(&colours.into(), ImageFormat::Jpeg);
-    vec![rough, turned, colours]
+    let turned = [&grey[..2], exif, &grey[2..]].concat();
+    vec![grey.to_vec(), turned, passes.to_vec(), inks.to_vec()]
 }
 
 /// A provenance for files of tests.
