@@ -447,7 +447,8 @@ step_page() {
     # The packages' own services stay off: the check runs both programs as docs/live-page-network.md has them.
     RUNLEVEL=1 debian nginx caddy openssl || echo "no nginx and no caddy installed here"
     PATH=$PATH:/usr/sbin in_browser check.py
-    led_truth 100
+    # Eight browsers beside the steps that build have little of two processors.
+    WORLDS=4 led_truth 100
 }
 
 step_led_truth() { led_truth "${EVENTS:-10000}"; }

@@ -36,6 +36,8 @@ LIMIT_S = 2.5
 LATE_S = 0.1
 # A page whose timers stood still for so long was asleep. It may go on saying what it said until its next look, 250 ms later.
 ASLEEP_S, WAKE_S = 0.25, 0.3
+# A world that stands still for so long has failed: builds beside it keep a page from its timers for a minute and more.
+PATIENCE_S = 240
 # Events a world has at most between two looks at what the page has said.
 LOOK_EVERY = 50
 
@@ -166,16 +168,18 @@ class World:
         self.broken = {}
         self.net = Cable(f"127.0.0.1:{self.port}")
         self.tab, self.said, self.done = "awake", [], collections.Counter()
+        # What was so when the world was last asked to obey.
+        self.state = "not asked yet"
 
     def begin(self):
         self.start_server()
-        until(lambda: self.camera.is_on, "the LEDs go on", 120)
+        until(lambda: self.camera.is_on, "the LEDs go on")
         # What a host sends until the LEDs are on is what the second host sends.
         self.greeting = b"".join(next(pair for pair in self.usb.pairs if pair["up"])["up"])
         self.page = self.browser.new_page()
         self.tools = self.page.context.new_cdp_session(self.page)
         self.page.add_init_script(RECORDER)
-        self.page.set_default_timeout(120_000)
+        self.page.set_default_timeout(1000 * PATIENCE_S)
         self.page.goto(self.net.address, wait_until="domcontentloaded")
 
     def start_server(self):
@@ -345,9 +349,12 @@ class World:
 
     def obeys(self, wish, words):
         self.keep_running()
-        self.post(wish)
+        is_heard = self.post(wish)
         time.sleep(0.5)
-        return self.page.locator("#leds").inner_text() == words and self.camera.is_on == (wish == "start")
+        says = self.page.locator("#leds").inner_text()
+        self.state = f"the page says {says!r}, LEDs are {'on' if self.camera.is_on else 'off'}, " \
+            f"the server {'answers' if is_heard else 'does not answer'} within 0.2 s"
+        return says == words and self.camera.is_on == (wish == "start")
 
     def close(self):
         if self.server:
@@ -364,10 +371,10 @@ def drain(host):
         pass
 
 
-def until(is_so, what, seconds):
+def until(is_so, what):
     since = time.time()
     while not is_so():
-        assert time.time() - since < seconds, f"not within {seconds} s: {what}"
+        assert time.time() - since < PATIENCE_S, f"not within {PATIENCE_S} s: {what}"
         time.sleep(0.02)
 
 
@@ -414,10 +421,10 @@ def live(arguments):
             world.heal()
             # A page that never knew anything would keep the law. At the end it says what is, and does what a person says.
             for wish, words in [("stop", "LEDs off, stopped"), ("start", "LEDs on")]:
-                until(lambda: world.obeys(wish, words), f"{words} after all events", 60)
+                until(lambda: world.obeys(wish, words), f"{words} after all events")
             world.look()
         except Exception as error:
-            failed = [f"the world ended after {world.done.total()} events: {error!r}"]
+            failed = [f"the world ended after {world.done.total()} events: {error!r}; {world.state}"]
         finally:
             world.close()
     broken, worst, near = judge(world.said, world.camera.edges)
