@@ -79,6 +79,16 @@ fn parts(shares: &[f64], noise: f64) -> Vec<Part> {
     shares.iter().map(|&share| Part { order: Order::ZigZag, share, noise }).collect()
 }
 
+/// One array of an `.npz` file.
+fn array(file: &Path, name: &str) -> Result<Vec<f32>> {
+    Ok(Archive::open(file)?.numbers_of(name, |_| Ok(()))?.values)
+}
+
+/// The rows of a real recording.
+fn rows(file: &Path, side: u64) -> Result<Rows> {
+    Ok(Rows::new(Side::new(side)?, array(file, "h_row")?.into_iter().map(|row| row as i32))?)
+}
+
 /// The natural scenes that training has not seen.
 fn natural(data: &Path, n: u64, most: usize) -> Result<Vec<Scene>> {
     let scenes = Scenes::read(data)?;
@@ -93,11 +103,9 @@ fn natural(data: &Path, n: u64, most: usize) -> Result<Vec<Scene>> {
 /// Characters of groups that training has not seen, `count` of each stack.
 fn characters(data: &Path, stack: &str, group: Option<&str>, count: usize) -> Result<Vec<Scene>> {
     let file = data.join(format!("chars74k/{stack}_train.npz"));
-    let mut archive = Archive::open(&file)?;
-    let mut array = |name: &str| archive.numbers_of::<f32>(name, |_| Ok(()));
-    let levels: Vec<u8> = array("x")?.values.into_iter().map(|level| level as u8).collect();
+    let levels: Vec<u8> = array(&file, "x")?.into_iter().map(|level| level as u8).collect();
     let groups: Vec<i64> = match group {
-        Some(group) => array(group)?.values.into_iter().map(|number| number as i64).collect(),
+        Some(group) => array(&file, group)?.into_iter().map(|number| number as i64).collect(),
         None => (0..levels.len() as i64 / 4096).collect(),
     };
     let held_out: serde_json::Value = serde_json::from_str(nirspi_nets::HELD_OUT)?;
@@ -224,13 +232,13 @@ fn characters_tables(data: &Path, methods: &Methods) -> Result<()> {
 /// The wing, and detectors of the car: name and measurements.
 fn instruments(data: &Path) -> Result<Vec<(String, Vec<Measurements>)>> {
     let wing = data.join("spi/opar_ala1.npz");
-    let rows = Rows::new(Side::new(64)?, array::<i32>(&wing, "h_row")?)?;
-    let y: Vec<f64> = array::<f32>(&wing, "y")?.into_iter().map(f64::from).collect();
-    let wing = Measurements::from_pairs(&rows, &y)?.measurements;
+    let shown = rows(&wing, 64)?;
+    let y: Vec<f64> = array(&wing, "y")?.into_iter().map(f64::from).collect();
+    let wing = Measurements::from_pairs(&shown, &y)?.measurements;
     let car = data.join("spi/scheidt_car.npz");
-    let rows = Rows::new(Side::new(32)?, array::<i32>(&car, "h_row")?)?;
-    let d: Vec<f64> = array::<i32>(&car, "d")?.into_iter().map(f64::from).collect();
-    let cars = d.chunks_exact(1024).map(|d| Measurements::from_differential(&rows, d));
+    let shown = rows(&car, 32)?;
+    let d: Vec<f64> = array(&car, "d")?.into_iter().map(f64::from).collect();
+    let cars = d.chunks_exact(1024).map(|d| Measurements::from_differential(&shown, d));
     let cars: Vec<Measurements> = cars.collect::<std::result::Result<_, _>>()?;
     Ok(vec![
         ("wing".to_owned(), vec![wing]),
