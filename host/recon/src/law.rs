@@ -22,7 +22,7 @@ mod lamp;
 mod outlier;
 mod pairs;
 mod repeats;
-mod robust;
+pub(crate) mod robust;
 mod signed;
 mod trend;
 

@@ -47,7 +47,7 @@ mod stacked;
 mod video;
 mod weight;
 
-pub use explain::{better_shift, explanation};
+pub use explain::{better_shift, explanation, few_patterns_see};
 pub use explanation::Explanation;
 pub use frame::{believed_frame, fused_frame};
 pub use held_back::HeldBack;

@@ -2,7 +2,9 @@
 
 use nirspi_recon::Measurements;
 use nirspi_recon::omp::Backend;
-use nirspi_recon::reconstruct::{HeldBack, Method, Report, better_shift, explanation};
+use nirspi_recon::reconstruct::{
+    HeldBack, Method, Report, better_shift, explanation, few_patterns_see,
+};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 use std::fmt;
@@ -29,10 +31,10 @@ impl MethodReport {
     pub fn doubt(&self, measurements: &Measurements) -> Option<String> {
         let held_back = self.made.held_back.filter(HeldBack::is_by_chance)?;
         // An even scene, as a white sheet, has nothing to predict.
-        if measurements
+        let is_even = measurements
             .noise()
-            .is_some_and(|noise| deviation(measurements) < HeldBack::EVEN * noise)
-        {
+            .is_some_and(|noise| deviation(measurements) < HeldBack::EVEN * noise);
+        if is_even || few_patterns_see(measurements) {
             return None;
         }
         let cause = match explanation(measurements) {

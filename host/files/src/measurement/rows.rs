@@ -225,15 +225,17 @@ pub(super) fn read_rows(fields: &mut Fields, side: Side) -> Result<Shown, FileEr
 
 /// A note on rows that were shown several times, if there are any.
 pub(super) fn repeats(rows: &[Option<u32>]) -> Option<String> {
-    let mut counts = std::collections::BTreeMap::<u32, usize>::new();
-    rows.iter().flatten().for_each(|&row| *counts.entry(row).or_default() += 1);
-    let of_several = || counts.values().copied().filter(|&count| count > 1);
+    let last = rows.iter().flatten().max()?;
+    let mut counts = vec![0_usize; *last as usize + 1];
+    rows.iter().flatten().for_each(|&row| counts[row as usize] += 1);
+    let of_several = || counts.iter().copied().filter(|&count| count > 1);
     let (least, most) = (of_several().min()?, of_several().max()?);
     let times = if least == most { most.to_string() } else { format!("{least} to {most}") };
+    let shown = counts.iter().filter(|&&count| count > 0).count();
     let which = match of_several().count() {
-        several if several == counts.len() => "each pattern was".to_owned(),
+        several if several == shown => "each pattern was".to_owned(),
         1 => "one pattern was".to_owned(),
-        several => format!("{several} of {} patterns were", counts.len()),
+        several => format!("{several} of {shown} patterns were"),
     };
     Some(format!("{which} shown {times} times: the mean of its readings is used"))
 }

@@ -43,8 +43,21 @@ pub fn parse(word: &str, decimal: char) -> Option<f64> {
         .or_else(|| grouped_number(word, decimal))
 }
 
-/// The longest of [`UNREAD`] and [`OVERLOADED`].
-const LONGEST_WORD: usize = 9;
+/// The longest of [`UNREAD`] and [`OVERLOADED`], in bytes.
+const LONGEST_WORD: usize = max(longest(&UNREAD), longest(&OVERLOADED));
+
+const fn longest(words: &[&str]) -> usize {
+    let (mut most, mut at) = (0, 0);
+    while at < words.len() {
+        most = max(most, words[at].len());
+        at += 1;
+    }
+    most
+}
+
+const fn max(a: usize, b: usize) -> usize {
+    if a > b { a } else { b }
+}
 
 /// What is no plain number.
 #[inline(never)]

@@ -26,7 +26,7 @@ pub(super) fn step(values: &[f64]) -> f64 {
 }
 
 /// The median, or the upper of the two middle values; 0 of none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
     }

@@ -2,6 +2,7 @@
 
 use super::explanation::{Explanation, MOST_READINGS};
 use super::{HeldBack, Method, MethodSettings};
+use crate::law::robust::median;
 use crate::{Measurements, Order, Rows, Side};
 
 /// The shift or the named order under which the readings predict each other best, if one does far
@@ -25,6 +26,31 @@ pub fn explanation(measurements: &Measurements) -> Option<Explanation> {
     named.filter(|_| best >= HeldBack::AMONG_MANY).map(|(explanation, _)| explanation)
 }
 
+/// Standard deviations of the noise from which a pattern sees a scene, and below which it does not.
+const SEES: f64 = 6.0;
+const SEES_NOT: f64 = 3.5;
+
+/// The largest share of the patterns that see a scene of few readings, and of those that are neither sure to see it nor sure not
+/// to.
+const FEW: f64 = 1.0 / 16.0;
+const UNSURE: f64 = 1.0 / 64.0;
+
+/// Ratio of the standard deviation of normally distributed values and the median of their magnitudes.
+const DEVIATION_OF_MEDIAN: f64 = 1.4826;
+
+/// Whether a few patterns see the scene and all others read noise, as with a square on the grid of the patterns, an edge, or
+/// bars. Such readings do not predict each other, whatever patterns they belong to: [`HeldBack`] cannot judge them.
+#[must_use]
+pub fn few_patterns_see(measurements: &Measurements) -> bool {
+    let readings = measurements.rows().iter().zip(measurements.values());
+    let sizes: Vec<f64> = readings.filter(|(row, _)| **row != 0).map(|(_, v)| v.abs()).collect();
+    let noise = DEVIATION_OF_MEDIAN * median(sizes.clone());
+    let above = |deviations: f64| sizes.iter().filter(|&&v| v > deviations * noise).count();
+    let (sees, perhaps) = (above(SEES), above(SEES_NOT));
+    let share = |count: usize| count as f64 / sizes.len() as f64;
+    sees > 0 && share(sees) <= FEW && share(perhaps - sees) <= UNSURE
+}
+
 /// Share of the readings' variation that is confirmed below which another shift is looked for.
 const LITTLE: f64 = 0.5;
 
@@ -39,7 +65,7 @@ pub fn better_shift(
     measurements: &Measurements,
     found: HeldBack,
 ) -> Option<(Explanation, HeldBack)> {
-    if found.confirmed >= LITTLE {
+    if found.confirmed >= LITTLE || few_patterns_see(measurements) {
         return None;
     }
     let tried = shifts(measurements.rows()).filter_map(|trial| judged(measurements, trial));
@@ -124,6 +150,40 @@ mod tests {
         assert_eq!(explanation(&other), Some(Explanation::Order(Order::ZigZag)));
         let noise = noisy(&cake, &[0.0; 1024], 1.0, 5);
         assert_eq!(explanation(&noise), None);
+    }
+
+    /// A figure on the grid of the patterns, on an even ground.
+    fn on_the_grid(n: usize, is_lit: impl Fn(usize, usize) -> bool) -> Vec<f64> {
+        (0..n * n).map(|at| if is_lit(at % n, at / n) { 1.0 } else { 0.1 }).collect()
+    }
+
+    #[test]
+    fn figures_that_few_patterns_see_are_not_judged_and_others_are() {
+        let n = 32;
+        let within = |at: usize, from: usize, to: usize| (from..to).contains(&at);
+        let figures = [
+            on_the_grid(n, |x, y| within(x, 8, 24) && within(y, 8, 24)),
+            on_the_grid(n, |x, _| x < 16),
+            on_the_grid(n, |x, _| x % 8 < 4),
+            on_the_grid(n, |x, y| within(x, 12, 20) || within(y, 12, 20)),
+        ];
+        let natural = Rows::natural(side(n as u64));
+        let mut by_chance = 0;
+        for (k, figure) in figures.iter().enumerate() {
+            for noise in [0.0, 0.3] {
+                let right = noisy(&natural, figure, noise, 1);
+                assert!(few_patterns_see(&right), "figure {k}, noise {noise}");
+                let found = held_back(&right);
+                by_chance += usize::from(found.is_some_and(|found| found.is_by_chance()));
+                assert_eq!(found.and_then(|found| better_shift(&right, found)), None);
+            }
+        }
+        assert!(by_chance > 0, "held-back readings judge them rightly");
+        for (kind, noise) in [(1, 0.05), (2, 0.05), (1, 0.5), (2, 0.5)] {
+            let right = noisy(&natural, &scene(natural.side(), kind), noise, 1);
+            assert!(!few_patterns_see(&right), "scene {kind}, noise {noise}");
+        }
+        assert!(!few_patterns_see(&noisy(&natural, &[0.0; 1024], 1.0, 5)));
     }
 
     #[test]
