@@ -1,8 +1,9 @@
-//! The images of many files, by one prepared method on all processors.
+//! The images of many files, which are one stack: what is the same for measurements of
+//! [one kind](nirspi_recon::reconstruct::stack) is found out once, as for the measurements of one file.
 //!
 //! # Invariant
-//! An image is the one that its file alone gives, and images are in the order of the files, whichever
-//! is made first (`tests::images_are_those_of_the_files_alone_in_their_order`). A file that gives no
+//! Images are those of a file with all measurements, in the order of the files
+//! (`tests::images_are_those_of_one_file_with_all_measurements_in_their_order`). A file that gives no
 //! image is named with the reason and takes no other with it
 //! (`tests::a_file_without_an_image_is_named_and_the_others_are_there`).
 
@@ -11,12 +12,14 @@ use crate::causes::in_one_line;
 use crate::imaging::MethodReport;
 use crate::provenance::Taken;
 use crate::source::{Index, OutlierReport, Source, SourceError, SourceOptions};
-use nirspi_recon::reconstruct::GoingOn;
+use nirspi_recon::reconstruct::{GoingOn, HeldBack, ReconstructError};
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Rows};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use thiserror::Error;
 
 /// The image of one measurement of one of many files.
@@ -66,6 +69,8 @@ pub(super) struct ManyImages {
     pub images: Vec<FileImage>,
     /// The files that give none.
     pub skipped: Vec<Skipped>,
+    /// Whether the work was ended. Then there are no images.
+    pub stopped: bool,
 }
 
 /// Why a file gives no image.
@@ -84,55 +89,96 @@ enum NoImage {
 
 /// Makes the image of each measurement of these files: all measurements of a measurement file, the sum
 /// of a recording's frames. With [`SourceOptions::index`], that one measurement of each file, or each
-/// frame of each recording. `side` is that of the images of files before these. `done` is called after each file, from any
-/// thread.
+/// frame of each recording. `side` is that of the images of files before these. `goes_on` is called once a file, from any
+/// thread; if it is false there are no images.
 pub(super) fn many_images(
     files: &[PathBuf],
     options: &SourceOptions,
     solver: &Solver,
     side: Option<usize>,
-    done: &(dyn Fn() + Sync),
+    goes_on: &(dyn Fn() -> bool + Sync),
 ) -> ManyImages {
-    let made: Vec<_> = files
-        .par_iter()
-        .map(|file| {
-            let made = images_of(file, options, solver);
-            done();
-            made
-        })
-        .collect();
-    let (mut all, mut side) = (ManyImages::default(), side);
-    for (file, made) in files.iter().zip(made) {
-        match made.and_then(|images| of_one_side(file, images, &mut side)) {
-            Ok(images) => all.images.extend(images),
+    let read: Vec<_> = files.par_iter().map(|file| sources_of(file, options)).collect();
+    let (mut side, mut wrong, mut right) = (side, BTreeMap::new(), Vec::new());
+    for (number, (file, read)) in files.iter().zip(read).enumerate() {
+        match read.and_then(|sources| of_one_side(file, sources, &mut side)) {
+            Ok(sources) => right.push(Read { number, file, sources }),
             Err(error) => {
-                let file = file.to_string_lossy().into_owned().into();
-                all.skipped.push(Skipped { file, reason: in_one_line(&error) });
+                wrong.insert(number, error);
+                goes_on();
             }
         }
     }
-    all
+    let pace = Pace::new(&right, goes_on);
+    let images = images_of(right, solver, &mut wrong, &pace);
+    let skipped = |(number, error): (usize, NoImage)| {
+        let file = files[number].to_string_lossy().into_owned().into();
+        Skipped { file, reason: in_one_line(&error) }
+    };
+    let skipped = wrong.into_iter().map(skipped).collect();
+    ManyImages { images, skipped, stopped: pace.stopped.into_inner() }
+}
+
+/// A file that was read.
+struct Read<'f> {
+    number: usize,
+    file: &'f Path,
+    sources: Vec<Source>,
+}
+
+impl Read<'_> {
+    /// The measurements, each with its number in a file of several.
+    fn each(&self) -> impl Iterator<Item = (Option<usize>, &Source)> {
+        let several = self.sources.len() > 1;
+        self.sources.iter().enumerate().map(move |(at, source)| (several.then_some(at), source))
+    }
+}
+
+/// How far the images of files are. `goes_on` is called as often as there are files, whatever the number of their images.
+struct Pace<'g> {
+    files: usize,
+    images: usize,
+    begun: AtomicUsize,
+    goes_on: &'g (dyn Fn() -> bool + Sync),
+    stopped: AtomicBool,
+}
+
+impl<'g> Pace<'g> {
+    fn new(read: &[Read<'_>], goes_on: &'g (dyn Fn() -> bool + Sync)) -> Self {
+        let images = read.iter().map(|read| read.sources.len()).sum();
+        let (begun, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        Self { files: read.len(), images, begun, goes_on, stopped }
+    }
+
+    fn before_image(&self) -> Result<(), ReconstructError> {
+        let begun = self.begun.fetch_add(1, Ordering::Relaxed);
+        // Images that are made again do not count.
+        let files = |images: usize| images.min(self.images) * self.files / self.images.max(1);
+        if files(begun + 1) > files(begun) && !(self.goes_on)() {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+        match self.stopped.load(Ordering::Relaxed) {
+            true => Err(ReconstructError::Stopped),
+            false => Ok(()),
+        }
+    }
 }
 
 fn of_one_side(
     file: &Path,
-    images: Vec<FileImage>,
+    sources: Vec<Source>,
     side: &mut Option<usize>,
-) -> Result<Vec<FileImage>, NoImage> {
-    let Some(n) = images.first().map(|image| image.image.side().pixels()) else {
-        return Ok(images);
+) -> Result<Vec<Source>, NoImage> {
+    let Some(n) = sources.first().map(|source| source.measurements.side().pixels()) else {
+        return Ok(sources);
     };
     match *side.get_or_insert(n) {
         expected if n != expected => Err(NoImage::Side { file: file.to_owned(), n, expected }),
-        _ => Ok(images),
+        _ => Ok(sources),
     }
 }
 
-fn images_of(
-    file: &Path,
-    options: &SourceOptions,
-    solver: &Solver,
-) -> Result<Vec<FileImage>, NoImage> {
+fn sources_of(file: &Path, options: &SourceOptions) -> Result<Vec<Source>, NoImage> {
     if file.to_str().is_none() {
         return Err(NoImage::Name(file.to_owned()));
     }
@@ -141,12 +187,85 @@ fn images_of(
         Some(Index::All) => false,
         None => options.fits_recording(file)?,
     };
-    let sources = match is_one {
+    Ok(match is_one {
         true => vec![Source::read(file, options)?],
         false => Source::read_all(file, options)?,
-    };
-    let all = Part { from: 0, several: sources.len() > 1 };
-    Ok(file_images(file, &sources, solver, all, false, &|| Ok(()))?)
+    })
+}
+
+/// The images of all files that give some. The others are added to `wrong`, and the images are those of the rest.
+fn images_of(
+    mut read: Vec<Read<'_>>,
+    solver: &Solver,
+    wrong: &mut BTreeMap<usize, NoImage>,
+    pace: &Pace<'_>,
+) -> Vec<FileImage> {
+    loop {
+        if let Ok(images) = together(&read, solver, pace) {
+            return images;
+        }
+        let alone = |read: &Read<'_>| together(std::slice::from_ref(read), solver, pace);
+        let made: Vec<_> = read.par_iter().map(alone).collect();
+        if pace.stopped.load(Ordering::Relaxed) {
+            return Vec::new();
+        }
+        if made.iter().all(Result::is_ok) {
+            return made.into_iter().flatten().flatten().collect();
+        }
+        let mut made = made.into_iter();
+        read.retain(|read| match made.next() {
+            Some(Err(error)) => {
+                wrong.insert(read.number, error.into());
+                false
+            }
+            _ => true,
+        });
+    }
+}
+
+/// The images of all measurements of these files, in their order.
+fn together(
+    read: &[Read<'_>],
+    solver: &Solver,
+    pace: &Pace<'_>,
+) -> Result<Vec<FileImage>, SolverError> {
+    let Some(first) = read.first() else { return Ok(Vec::new()) };
+    let all: Vec<(&Path, Option<usize>, &Source)> = read
+        .iter()
+        .flat_map(|read| read.each().map(|(index, source)| (read.file, index, source)))
+        .collect();
+    // Parts of complex readings are made together: those of files that have both.
+    let (complex, real): (Vec<usize>, Vec<usize>) =
+        (0..all.len()).partition(|&at| all[at].2.imaginary.is_some());
+    let (mut made, mut verdicts) = (BTreeMap::new(), Verdicts::default());
+    for places in [complex, real] {
+        let sources: Vec<&Source> = places.iter().map(|&at| all[at].2).collect();
+        let solved = solver.solve_all(first.file, &sources, false, &|| pace.before_image())?;
+        for (at, solved) in places.into_iter().zip(solved) {
+            let (file, index, source) = all[at];
+            let warnings = verdicts.warnings(source, &solved.report);
+            made.insert(at, file_image((file, index), source, solved, warnings));
+        }
+    }
+    Ok(made.into_values().collect())
+}
+
+/// The doubts about measurements, found out once for those that held-back readings say the same of: those of one kind.
+#[derive(Default)]
+struct Verdicts(HashMap<([u64; 3], [bool; 2]), Vec<String>>);
+
+impl Verdicts {
+    /// What a user must know of an image.
+    fn warnings(&mut self, source: &Source, report: &MethodReport) -> Vec<String> {
+        let Some(HeldBack { miss, confirmed, score }) = report.made.held_back else {
+            return all_warnings(source, report);
+        };
+        // What is doubted also depends on these.
+        let of_source = [source.warnings.is_empty(), source.frames.is_some()];
+        let kind = [miss, confirmed, score].map(f64::to_bits);
+        let doubts = self.0.entry((kind, of_source)).or_insert_with(|| doubts(source, report));
+        source.all_warnings().into_iter().chain(doubts.iter().cloned()).collect()
+    }
 }
 
 /// Which of the measurements of a file these are.
@@ -169,45 +288,61 @@ pub(super) fn file_images(
     going_on: GoingOn<'_>,
 ) -> Result<Vec<FileImage>, SolverError> {
     let made = solver.solve_all(file, sources, is_video, going_on)?;
-    let image = |(index, (source, solved)): (usize, (&Source, Solved))| {
-        let Solved { image, with_readings, parts, used, order, report, .. } = solved;
+    let all = sources.iter().zip(made).enumerate();
+    let image = |(at, (source, solved)): (usize, (&Source, Solved))| {
+        let index = part.from + at;
         // The frames of one recording lack the same, and are judged together.
         let warnings = match index {
-            0 => all_warnings(source, &report),
+            0 => all_warnings(source, &solved.report),
             _ => source.warnings.clone(),
         };
-        let computed = report.made.computed.as_deref().map(str::to_owned);
-        let notes = losses(source).chain(source.notes.iter().cloned()).chain(computed);
-        FileImage {
-            file: file.to_owned(),
-            index: part.several.then_some(index),
-            image,
-            with_readings,
-            used: used.rows().clone(),
-            order,
-            complex: parts.is_some(),
-            recorded: source.frames.is_some(),
-            report,
-            outliers: source.outliers.iter().map(OutlierReport::of).collect(),
-            notes: notes.collect(),
-            warnings,
-            taken: source.taken.clone(),
-        }
+        file_image((file, part.several.then_some(index)), source, solved, warnings)
     };
-    let all = sources.iter().zip(made).enumerate();
-    Ok(all.map(|(at, both)| image((part.from + at, both))).collect())
+    Ok(all.map(image).collect())
+}
+
+/// The image of one measurement, with the number of the measurement in a file of several.
+fn file_image(
+    (file, index): (&Path, Option<usize>),
+    source: &Source,
+    solved: Solved,
+    warnings: Vec<String>,
+) -> FileImage {
+    let Solved { image, with_readings, parts, used, order, report, .. } = solved;
+    let computed = report.made.computed.as_deref().map(str::to_owned);
+    let notes = losses(source).chain(source.notes.iter().cloned()).chain(computed);
+    FileImage {
+        file: file.to_owned(),
+        index,
+        image,
+        with_readings,
+        used: used.rows().clone(),
+        order,
+        complex: parts.is_some(),
+        recorded: source.frames.is_some(),
+        report,
+        outliers: source.outliers.iter().map(OutlierReport::of).collect(),
+        notes: notes.collect(),
+        warnings,
+        taken: source.taken.clone(),
+    }
 }
 
 /// What a user must know of an image: of its readings, and whether they belong to their patterns.
 pub(super) fn all_warnings(source: &Source, report: &MethodReport) -> Vec<String> {
     let mut warnings = source.all_warnings();
+    warnings.extend(doubts(source, report));
+    warnings
+}
+
+/// Whether the readings belong to their patterns.
+fn doubts(source: &Source, report: &MethodReport) -> Vec<String> {
     // A named form of the readings says more.
     let doubt = source.warnings.is_empty().then(|| report.doubt(&source.measurements)).flatten();
     // A recording of our own camera numbers its readings.
     let may_be_shifted = doubt.is_none() && source.frames.is_none();
     let shift = may_be_shifted.then(|| report.better_shift(&source.measurements)).flatten();
-    warnings.extend(doubt.or(shift));
-    warnings
+    doubt.or(shift).into_iter().collect()
 }
 
 /// The readings that a measurement lacks, in words.
@@ -256,22 +391,81 @@ mod tests {
     }
 
     #[test]
-    fn images_are_those_of_the_files_alone_in_their_order() {
+    fn images_are_those_of_one_file_with_all_measurements_in_their_order() {
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<PathBuf> = (0..40).map(|k| measured(folder.path(), k, 8)).collect();
-        let (options, solver, done) = (SourceOptions::default(), solver(), AtomicUsize::new(0));
-        let made = many_images(&files, &options, &solver, None, &|| {
-            done.fetch_add(1, Ordering::Relaxed);
-        });
-        assert_eq!((made.skipped, done.into_inner()), (Vec::new(), 40));
-        assert!(made.images.iter().map(|image| &image.file).eq(&files));
-        for image in &made.images {
-            let source = Source::read(&image.file, &options).unwrap();
-            let alone = solver.solve(&image.file, &source).unwrap();
-            assert_eq!(image.image.pixels(), alone.image.pixels());
-            assert_eq!((image.index, image.used.len()), (None, 64));
+        let (options, asked) = (SourceOptions::default(), AtomicUsize::new(0));
+        let read = |file| Source::read(file, &options).unwrap();
+        let sources: Vec<Source> = files.iter().map(|file| read(file)).collect();
+        for method in [Method::HADAMARD, Method::TIKHONOV] {
+            let solver = solver_of(method);
+            let made = many_images(&files, &options, &solver, None, &|| {
+                asked.fetch_add(1, Ordering::Relaxed);
+                true
+            });
+            assert!(made.skipped.is_empty() && !made.stopped);
+            assert!(made.images.iter().map(|image| &image.file).eq(&files));
+            let all = solver.solve_all(&files[0], &sources, false, &|| Ok(())).unwrap();
+            for (image, of_stack) in made.images.iter().zip(&all) {
+                assert_eq!(image.image.pixels(), of_stack.image.pixels());
+                assert_eq!((image.index, image.used.len()), (None, 64));
+            }
+            assert_ne!(made.images[0].image.pixels(), made.images[1].image.pixels());
         }
-        assert_ne!(made.images[0].image.pixels(), made.images[1].image.pixels());
+        assert_eq!(asked.into_inner(), 80, "once a file");
+        let made = many_images(&files, &options, &solver(), None, &|| false);
+        assert!(made.stopped && made.images.is_empty() && made.skipped.is_empty());
+    }
+
+    #[test]
+    fn a_file_without_images_leaves_the_others_as_they_are_without_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut files: Vec<PathBuf> = (0..20).map(|k| measured(folder.path(), k, 8)).collect();
+        let (options, solver) = (SourceOptions::default(), solver_of(Method::TIKHONOV));
+        let good = many_images(&files, &options, &solver, None, &|| true);
+        // Its pixels are infinite as 32-bit floats.
+        let text = std::fs::read_to_string(&files[7]).unwrap().replace(".5\n", ".5e39\n");
+        let large = folder.path().join("large.csv");
+        std::fs::write(&large, text).unwrap();
+        files.insert(7, large.clone());
+        let asked = AtomicUsize::new(0);
+        let made = many_images(&files, &options, &solver, None, &|| {
+            asked.fetch_add(1, Ordering::Relaxed);
+            true
+        });
+        assert_eq!((made.skipped.len(), asked.into_inner()), (1, 21));
+        assert_eq!(made.skipped[0].file, large);
+        assert!(made.skipped[0].reason.contains("too large"), "{:?}", made.skipped);
+        let pixels = |made: &ManyImages| -> Vec<f32> {
+            made.images.iter().flat_map(|image| image.image.pixels().to_vec()).collect()
+        };
+        assert_eq!(pixels(&made), pixels(&good));
+    }
+
+    #[test]
+    fn files_of_one_kind_are_doubted_together_and_others_by_themselves() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, value: &dyn Fn(usize) -> f64| {
+            let mut text = "n,h_row,d\n".to_owned();
+            (0..256).for_each(|row| writeln!(text, "16,{row},{}", value(row)).unwrap());
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let of_no_scene = |row: usize| ((row * 7919 + 13) % 101) as f64 - 50.0;
+        let corner = |row: usize| if row & 0x88 == 0 { 64.0 } else { 0.0 };
+        let mut files: Vec<PathBuf> =
+            (0..10).map(|k| write(&format!("{k}.csv"), &of_no_scene)).collect();
+        files.push(write("bright.csv", &|row| 100.0 * corner(row)));
+        let solver = solver_of(Method::TIKHONOV);
+        let made = many_images(&files, &SourceOptions::default(), &solver, None, &|| true);
+        let is_doubt = |warning: &&String| warning.contains("no better than chance");
+        let doubts: Vec<usize> = made
+            .images
+            .iter()
+            .map(|image| image.warnings.iter().filter(is_doubt).count())
+            .collect();
+        assert_eq!(doubts, [[1; 10].as_slice(), &[0]].concat());
     }
 
     #[test]
@@ -281,7 +475,7 @@ mod tests {
         let other_side = measured(folder.path(), 3, 4);
         let gone = folder.path().join("gone.csv");
         let files = [first.clone(), gone.clone(), other_side.clone(), last.clone()];
-        let made = many_images(&files, &SourceOptions::default(), &solver(), None, &|| {});
+        let made = many_images(&files, &SourceOptions::default(), &solver(), None, &|| true);
         let with: Vec<&PathBuf> = made.images.iter().map(|image| &image.file).collect();
         let without: Vec<&PathBuf> = made.skipped.iter().map(|skipped| &skipped.file).collect();
         assert_eq!((with, without), (vec![&first, &last], vec![&gone, &other_side]));

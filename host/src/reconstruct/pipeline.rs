@@ -30,9 +30,8 @@ use nirspi_recon::Backend;
 use nirspi_recon::reconstruct::{AT_A_TIME, ReconstructError};
 use nirspi_recon::words::count_of;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Files that are read together, on all processors.
+/// Files that are read together, and are one stack, on all processors.
 const FILES_AT_A_TIME: usize = 256;
 
 /// A method, and the networks that also enlarge and deblur its images, if they are wanted.
@@ -115,7 +114,8 @@ impl Pipeline {
     }
 
     /// Makes the images of many files, and writes them as one stack: of each all measurements, or one or all frames, as
-    /// [`SourceOptions::index`] says. A file that gives no image is among [`StackReport::skipped`].
+    /// [`SourceOptions::index`] says. What is the same for measurements of [one kind](nirspi_recon::reconstruct::stack) is found
+    /// out once for 256 files. A file that gives no image is among [`StackReport::skipped`].
     ///
     /// # Errors
     /// As [`all`](Self::all).
@@ -128,22 +128,14 @@ impl Pipeline {
         mut times: StageTimes,
     ) -> Result<StackReport, PipelineError> {
         let (mut writing, mut skipped, mut side, mut ended) = (None, Vec::new(), None, None);
-        let stop = AtomicBool::new(false);
         for some in files.chunks(FILES_AT_A_TIME) {
-            let done = || {
-                if !watch(Step::Reconstruct) {
-                    stop.store(true, Ordering::Relaxed);
-                }
-            };
-            let made =
-                times.time("reconstruct", || many_images(some, options, &self.solver, side, &done));
+            let goes_on = || watch(Step::Reconstruct);
+            let made = times
+                .time("reconstruct", || many_images(some, options, &self.solver, side, &goes_on));
             side = side.or_else(|| made.images.first().map(|image| image.image.side().pixels()));
             skipped.extend(made.skipped);
             let added = self.add(&mut writing, &made.images, folder, &mut times);
-            ended = added.err();
-            if ended.is_none() && stop.load(Ordering::Relaxed) {
-                ended = Some(PipelineError::Stopped);
-            }
+            ended = added.err().or(made.stopped.then_some(PipelineError::Stopped));
             if ended.is_some() {
                 break;
             }

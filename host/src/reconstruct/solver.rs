@@ -10,6 +10,7 @@ use nirspi_recon::reconstruct::{
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, MeasurementError, Measurements, Rows, Sampling, Shape, ShorterSweep};
 use rayon::prelude::*;
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -181,10 +182,10 @@ impl Solver {
     ///
     /// # Errors
     /// As [`solve`](Self::solve); and the error of `going_on`.
-    pub fn solve_all(
+    pub fn solve_all<S: Borrow<Source> + Sync>(
         &self,
         path: &Path,
-        sources: &[Source],
+        sources: &[S],
         is_video: bool,
         going_on: GoingOn<'_>,
     ) -> Result<Vec<Solved>, SolverError> {
@@ -202,18 +203,21 @@ impl Solver {
             last = Some((rows.clone(), (sweep, order)));
             Ok::<_, SolverError>(taken)
         };
-        let taken: Vec<(Measurements, String)> =
-            sources.iter().map(|source| take(&source.measurements)).collect::<Result<_, _>>()?;
+        let taken: Vec<(Measurements, String)> = sources
+            .iter()
+            .map(|source| take(&source.borrow().measurements))
+            .collect::<Result<_, _>>()?;
         let (used, orders): (Vec<Measurements>, Vec<String>) = taken.into_iter().unzip();
         // Imaginary parts of complex readings: all measurements of a file have one, or none has.
-        let imaginary = sources.iter().filter_map(|source| source.imaginary.as_ref());
+        let imaginary = sources.iter().filter_map(|source| source.borrow().imaginary.as_ref());
         let imaginary: Vec<Measurements> =
             imaginary.map(|part| Ok(take(part)?.0)).collect::<Result<_, SolverError>>()?;
         let others = self.images(&imaginary, is_video, going_on)?.into_iter().map(Some);
         let others = others.chain(std::iter::repeat_with(|| None));
         let made = self.images(&used, is_video, going_on)?;
         let all: Vec<_> = made.into_iter().zip(others).zip(used).zip(orders).zip(sources).collect();
-        let solved = |((((made, other), used), order), source): (_, &Source)| {
+        let solved = |((((made, other), used), order), source): (_, &S)| {
+            let source = source.borrow();
             let (made, other): (Reconstruction, Option<Reconstruction>) = (made, other);
             let with_readings = source.flattened(made.with_readings(&used));
             let Reconstruction { image, report: made } = made;

@@ -3,7 +3,7 @@
 /// What is done to a stack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// An image is made of measurements, or all images of one of many files.
+    /// An image is made of measurements; of many files, it comes once for each file.
     Reconstruct,
     /// Networks enlarge and deblur an image.
     Enhance,
