@@ -5,6 +5,7 @@ use super::{command, command::Command};
 use crate::files::contents::{Array, Contents};
 use crate::files::trace::{self, Cut};
 use nirspi_recon::Size;
+use nirspi_recon::reconstruct::few_patterns_see;
 use nirspi_recon::words::count_of;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -296,6 +297,19 @@ pub(super) fn unexplained(
         return Some(Finding { what, commands: vec![cut.line()] });
     }
     let picture = contents.arrays().iter().find(|array| array.axes().len() > 1);
+    if guesses.iter().any(|guess| few_patterns_see(&guess.measurements)) {
+        let what = match picture {
+            None => "readings of a scene that few patterns see: they fit every order alike",
+            Some(_) => {
+                "readings of a scene that few patterns see, which fit every order alike, or an image"
+            }
+        };
+        let shown = Command::new("reconstruct", path)
+            .option("--shown", "ORDER")
+            .option("--out", "out/")
+            .line();
+        return Some(Finding { what: what.to_owned(), commands: vec![shown] });
+    }
     let what = match (guesses.is_empty(), picture) {
         (true, None) => "no readings that fit a sweep of Hadamard patterns",
         (true, Some(_)) => "no readings; perhaps images",

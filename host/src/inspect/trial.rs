@@ -5,7 +5,7 @@ use crate::files::measurement::MeasurementFile;
 use crate::recording::RecordingInfo;
 use crate::source::{Part, Source, by_law};
 use nirspi_recon::law::{Doubt, Explanation, Form};
-use nirspi_recon::reconstruct::{HeldBack, Method, MethodSettings, Reconstruct};
+use nirspi_recon::reconstruct::{HeldBack, Method, MethodSettings, Reconstruct, few_patterns_see};
 use nirspi_recon::{Image, Measurements, Side};
 use serde::Serialize;
 use std::path::Path;
@@ -122,7 +122,7 @@ impl Verdict {
     /// Whether this is no better than chance, where the file names the patterns or where many orders are tried.
     pub(super) fn by_chance(&self, has_rows: bool) -> bool {
         match has_rows {
-            true => self.held_back.is_by_chance(),
+            true => self.held_back.is_by_chance() && !few_patterns_see(&self.measurements),
             false => self.held_back.score < HeldBack::AMONG_MANY,
         }
     }
@@ -225,7 +225,7 @@ impl Judge {
             readings: verdict.measurements.rows().len(),
             explained: verdict.held_back.confirmed,
             agreement: verdict.held_back.score,
-            by_chance: verdict.held_back.is_by_chance(),
+            by_chance: verdict.by_chance(true),
             contradicted: !source.warnings.is_empty(),
             warnings: source.all_warnings(),
             measurements_in_file: None,

@@ -283,6 +283,34 @@ fn numbers_that_are_no_readings_get_no_way_that_fits() {
 }
 
 #[test]
+fn a_scene_that_few_patterns_see_is_not_called_noise() {
+    let bench = Bench::new();
+    // A square on the grid of the patterns, 8 x 8 of 16 x 16 pixels: 16 of 256 patterns see it.
+    let lit = |p: usize| (4..12).contains(&(p / 16)) && (4..12).contains(&(p % 16));
+    let of_row = |k: usize| -> f32 {
+        let lit = (0..256).filter(|&p| lit(p));
+        lit.map(|p| if (k & p).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }).sum()
+    };
+    let d: Vec<f32> = (0..256).map(of_row).collect();
+    bench.write("square.npy", &encode(&[256], &d));
+    let said = bench.run(&["inspect", "square.npy"]).succeeded().stdout;
+    assert!(
+        said.contains("readings of a scene that few patterns see: they fit every order"),
+        "{said}"
+    );
+    assert!(said.contains("nirspi reconstruct square.npy --shown ORDER"), "{said}");
+    // A file that names its patterns belongs to them.
+    let rows: Vec<f32> = (0..256).map(|k| k as f32).collect();
+    bench.write(
+        "rows.npz",
+        &npz(&[("n", &[], &[16.0]), ("h_row", &[256], &rows), ("d", &[256], &d)]),
+    );
+    let (report, said) = first_guess(&bench, "rows.npz");
+    assert_eq!(report["guesses"][0]["by_chance"], false, "{report}");
+    assert!(!said.concat().contains("warning"), "{said:?}");
+}
+
+#[test]
 fn what_is_no_file_of_readings_is_one_line() {
     let (bench, scene) = (Bench::new(), Natural::new());
     bench.write("empty.csv", b"");
