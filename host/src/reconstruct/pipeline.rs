@@ -31,8 +31,13 @@ use nirspi_recon::reconstruct::{AT_A_TIME, ReconstructError};
 use nirspi_recon::words::count_of;
 use std::path::PathBuf;
 
-/// Files that are read together, and are one stack, on all processors.
-const FILES_AT_A_TIME: usize = 256;
+/// Files whose readings are in memory together, and are one stack: many small ones, fewer large ones. `side` is that of their
+/// images, if it is known.
+fn files_at_a_time(side: Option<usize>) -> usize {
+    const FEWEST: usize = 256;
+    const PIXELS: usize = AT_A_TIME * 32 * 32;
+    side.map_or(FEWEST, |n| (PIXELS / (n * n)).clamp(FEWEST, AT_A_TIME))
+}
 
 /// A method, and the networks that also enlarge and deblur its images, if they are wanted.
 pub struct Pipeline {
@@ -115,7 +120,7 @@ impl Pipeline {
 
     /// Makes the images of many files, and writes them as one stack: of each all measurements, or one or all frames, as
     /// [`SourceOptions::index`] says. What is the same for measurements of [one kind](nirspi_recon::reconstruct::stack) is found
-    /// out once for 256 files. A file that gives no image is among [`StackReport::skipped`].
+    /// out once for files that are in memory together. A file that gives no image is among [`StackReport::skipped`].
     ///
     /// # Errors
     /// As [`all`](Self::all).
@@ -128,7 +133,10 @@ impl Pipeline {
         mut times: StageTimes,
     ) -> Result<StackReport, PipelineError> {
         let (mut writing, mut skipped, mut side, mut ended) = (None, Vec::new(), None, None);
-        for some in files.chunks(FILES_AT_A_TIME) {
+        let mut left = files;
+        while !left.is_empty() {
+            let (some, rest) = left.split_at(files_at_a_time(side).min(left.len()));
+            left = rest;
             let goes_on = || watch(Step::Reconstruct);
             let made = times
                 .time("reconstruct", || many_images(some, options, &self.solver, side, &goes_on));
