@@ -110,7 +110,7 @@ pub(super) fn many_images(
         }
     }
     let pace = Pace::new(&right, goes_on);
-    let images = images_of(right, solver, &mut wrong, &pace);
+    let images = images_of(&right, solver, &mut wrong, &pace);
     let skipped = |(number, error): (usize, NoImage)| {
         let file = files[number].to_string_lossy().into_owned().into();
         Skipped { file, reason: in_one_line(&error) }
@@ -193,34 +193,29 @@ fn sources_of(file: &Path, options: &SourceOptions) -> Result<Vec<Source>, NoIma
     })
 }
 
-/// The images of all files that give some. The others are added to `wrong`, and the images are those of the rest.
+/// The images of all files that give some; the others are added to `wrong`. Where files give none together, each gives its own.
 fn images_of(
-    mut read: Vec<Read<'_>>,
+    read: &[Read<'_>],
     solver: &Solver,
     wrong: &mut BTreeMap<usize, NoImage>,
     pace: &Pace<'_>,
 ) -> Vec<FileImage> {
-    loop {
-        if let Ok(images) = together(&read, solver, pace) {
-            return images;
-        }
-        let alone = |read: &Read<'_>| together(std::slice::from_ref(read), solver, pace);
-        let made: Vec<_> = read.par_iter().map(alone).collect();
-        if pace.stopped.load(Ordering::Relaxed) {
-            return Vec::new();
-        }
-        if made.iter().all(Result::is_ok) {
-            return made.into_iter().flatten().flatten().collect();
-        }
-        let mut made = made.into_iter();
-        read.retain(|read| match made.next() {
-            Some(Err(error)) => {
-                wrong.insert(read.number, error.into());
-                false
-            }
-            _ => true,
-        });
+    if let Ok(images) = together(read, solver, pace) {
+        return images;
     }
+    let alone = |read: &Read<'_>| together(std::slice::from_ref(read), solver, pace);
+    let made: Vec<_> = read.par_iter().map(alone).collect();
+    let mut all = Vec::new();
+    if pace.stopped.load(Ordering::Relaxed) {
+        return all;
+    }
+    for (read, made) in read.iter().zip(made) {
+        match made {
+            Ok(images) => all.extend(images),
+            Err(error) => drop(wrong.insert(read.number, error.into())),
+        }
+    }
+    all
 }
 
 /// The images of all measurements of these files, in their order.
@@ -369,14 +364,17 @@ mod tests {
     }
 
     fn solver_of(method: Method) -> Solver {
-        Solver::new(Recipe {
+        Solver::new(recipe_of(method)).unwrap()
+    }
+
+    fn recipe_of(method: Method) -> Recipe {
+        Recipe {
             method,
             settings: MethodSettings::default(),
             dictionary: None,
             first: FirstPatterns::Recorded,
             sampling: Sampling::ALL,
-        })
-        .unwrap()
+        }
     }
 
     /// A measurement of n x n patterns, whose readings depend on `number`.
@@ -418,28 +416,15 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_images_leaves_the_others_as_they_are_without_it() {
+    fn files_that_give_no_image_together_are_each_named() {
         let folder = tempfile::tempdir().unwrap();
-        let mut files: Vec<PathBuf> = (0..20).map(|k| measured(folder.path(), k, 8)).collect();
-        let (options, solver) = (SourceOptions::default(), solver_of(Method::TIKHONOV));
-        let good = many_images(&files, &options, &solver, None, &|| true);
-        // Its pixels are infinite as 32-bit floats.
-        let text = std::fs::read_to_string(&files[7]).unwrap().replace(".5\n", ".5e39\n");
-        let large = folder.path().join("large.csv");
-        std::fs::write(&large, text).unwrap();
-        files.insert(7, large.clone());
-        let asked = AtomicUsize::new(0);
-        let made = many_images(&files, &options, &solver, None, &|| {
-            asked.fetch_add(1, Ordering::Relaxed);
-            true
-        });
-        assert_eq!((made.skipped.len(), asked.into_inner()), (1, 21));
-        assert_eq!(made.skipped[0].file, large);
-        assert!(made.skipped[0].reason.contains("too large"), "{:?}", made.skipped);
-        let pixels = |made: &ManyImages| -> Vec<f32> {
-            made.images.iter().flat_map(|image| image.image.pixels().to_vec()).collect()
-        };
-        assert_eq!(pixels(&made), pixels(&good));
+        let files: Vec<PathBuf> = (0..20).map(|k| measured(folder.path(), k, 8)).collect();
+        let dictionary = Some(folder.path().join("gone.npy"));
+        let solver = Solver::new(Recipe { dictionary, ..recipe_of(Method::OMP) }).unwrap();
+        let made = many_images(&files, &SourceOptions::default(), &solver, None, &|| true);
+        assert!(made.images.is_empty() && !made.stopped);
+        assert!(made.skipped.iter().map(|skipped| &skipped.file).eq(&files));
+        assert!(made.skipped.iter().all(|skipped| skipped.reason.contains("gone.npy")));
     }
 
     #[test]
