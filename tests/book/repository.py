@@ -1,4 +1,5 @@
-"""A preprocessor of mdBook: a link of a page to a file outside of the two books becomes an address in the repository.
+"""A preprocessor of mdBook: a link of a page to a file outside of the two books becomes an address in the repository, and a picture
+leads to its own file, which a phone shows in full size.
 
 docs/book.toml and docs/log/book.toml name it. In the repository the same links lead from file to file.
 """
@@ -13,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 ADDRESS = "https://github.com/nirspi/nirspi"
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
+PICTURE = re.compile(r"^!\[[^\]]*\]\(([^)\s]+)\)$", re.MULTILINE)
 # Pages that mdBook does not render, beside files outside of docs/.
 NOT_RENDERED = {DOCS / "SUMMARY.md", DOCS / "log/SUMMARY.md"}
 
@@ -38,7 +40,11 @@ def rewritten(text, folder):
         return f"]({address(path, anchor)})"
 
     parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
-    return "".join(part if part.startswith("```") else LINK.sub(link, part) for part in parts)
+
+    def text_part(part):
+        return PICTURE.sub(lambda match: f"[{match[0]}]({match[1]})", LINK.sub(link, part))
+
+    return "".join(part if part.startswith("```") else text_part(part) for part in parts)
 
 
 def visit(item, source):
