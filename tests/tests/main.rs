@@ -8,6 +8,7 @@ mod dependencies;
 mod end_to_end;
 mod faults;
 mod mutated_files;
+mod page_figures;
 mod qemu;
 mod quality_page;
 mod register_table;

@@ -21,7 +21,7 @@ use std::sync::Arc;
 pub(super) fn shown(size: Size, steps: usize) -> Result<Patterns, (String, String)> {
     let (area, count) = (size.area(), size.area() * steps);
     if (count * area * size_of::<f64>()) as u64 > MAX_MEMORY_BYTES {
-        return Err((format!("{count} patterns of {size} pixels"), "at most 1 GiB".to_owned()));
+        return Err((format!("{count} patterns of {size} pixels"), "at most 512 MiB".to_owned()));
     }
     Ok(Patterns { size, count, weights: shown_weights(size, steps) })
 }
@@ -80,7 +80,7 @@ pub(in crate::measurement) fn read_fourier(
         }
         if (rows.len() * area * size_of::<f64>()) as u64 > MAX_MEMORY_BYTES {
             let found = format!("has {} of {size} pixels", count_of(rows.len(), "coefficient"));
-            let expected = "at most 1 GiB of patterns: about 100 x 100 pixels";
+            let expected = "at most 512 MiB of patterns: about 90 x 90 pixels";
             return Err(refused(found, expected.to_owned()));
         }
         // Measurements of the same frequencies have the same patterns.
