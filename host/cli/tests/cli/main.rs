@@ -23,6 +23,7 @@ mod enhance;
 mod everyday;
 mod exports;
 mod feed;
+mod figures;
 mod foreign_devices;
 mod forms;
 mod help;
