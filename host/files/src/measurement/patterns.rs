@@ -215,7 +215,11 @@ fn pictures(folder: &Path) -> Result<(String, Vec<usize>, Vec<f64>), FileError> 
             return Err(FileError::field(file, "the picture", found, expected));
         }
         if (weights.len() + grey.values.len()) as u64 * 8 > MAX_MEMORY_BYTES {
-            return Err(FileError::kind(folder, "too many pictures", "patterns of at most 512 MiB"));
+            return Err(FileError::kind(
+                folder,
+                "too many pictures",
+                "patterns of at most 512 MiB",
+            ));
         }
         weights.extend(grey.values.into_iter().map(f64::from));
     }
