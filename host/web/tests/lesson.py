@@ -7,7 +7,9 @@ it saw.
 """
 
 import argparse
+import gzip
 import pathlib
+import re
 import sys
 
 from playwright.sync_api import expect, sync_playwright
@@ -292,6 +294,30 @@ def touched(page):
     looks_like(page, "share-sum", drawn, 0.999)
 
 
+def sizes(folder):
+    """The pages of the book say how much a server sends that compresses files."""
+    folder = pathlib.Path(folder)
+    docs = pathlib.Path(__file__).parents[3] / "docs"
+
+    def megabytes(start, rest, compress=lambda data: gzip.compress(data, 6)):
+        files = [folder / start, *sorted((folder / rest).iterdir())]
+        return sum(len(compress(file.read_bytes())) for file in files) / 1e6
+
+    def says(name, sentence):
+        found = re.search(sentence, " ".join((docs / name).read_text().split()))
+        assert found, f"docs/{name} has no sentence {sentence!r}: name the new one here"
+        return [float(part) for part in found.groups()]
+
+    lesson, camera = megabytes("lesson.html", "lesson"), megabytes("index.html", "page")
+    everything = sum(megabytes(*part, lambda data: data) for part in [("lesson.html", "lesson"), ("index.html", "page")])
+    print(f"compressed: lesson {lesson:.2f} MB, camera {camera:.2f} MB; the folder {everything:.2f} MB")
+    assert [round(camera)] == says("lesson.md", r"with its networks, about (\d+) MB")
+    assert [round(camera)] == says("browser.md", r"A server that compresses sends about (\d+) MB")
+    assert lesson < says("lesson.md", r"The other steps load less than (\d+) MB")[0]
+    table = says("browser.md", r"size of the folder, compressed \| ([\d.]+) MB, ([\d.]+) MB")
+    assert table == [round(everything, 1), round(lesson + camera, 1)], table
+
+
 def screens(browser, base, folder):
     for name, width, height, scheme in SCREENS:
         context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": height}, has_touch=width < 500)
@@ -321,6 +347,7 @@ def main():
     parser.add_argument("folder")
     parser.add_argument("--screenshots")
     given = parser.parse_args()
+    sizes(given.folder)
     base = served(Files, given.folder)
     expect.set_options(timeout=LIMIT_MS)
     with sync_playwright() as play:
