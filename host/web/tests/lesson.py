@@ -303,15 +303,16 @@ def sizes(folder):
         files = [folder / start, *sorted((folder / rest).iterdir())]
         return sum(len(compress(file.read_bytes())) for file in files) / 1e6
 
-    def says(name, sentence):
-        found = re.search(sentence, " ".join((docs / name).read_text().split()))
-        assert found, f"docs/{name} has no sentence {sentence!r}: name the new one here"
+    def says(name, sentence, within=docs):
+        found = re.search(sentence, " ".join((within / name).read_text().split()))
+        assert found, f"{within / name} has no sentence {sentence!r}: name the new one here"
         return [float(part) for part in found.groups()]
 
     lesson, camera = megabytes("lesson.html", "lesson"), megabytes("index.html", "page")
     everything = sum(megabytes(*part, lambda data: data) for part in [("lesson.html", "lesson"), ("index.html", "page")])
     print(f"compressed: lesson {lesson:.2f} MB, camera {camera:.2f} MB; the folder {everything:.2f} MB")
     assert [round(camera)] == says("lesson.md", r"with its networks, about (\d+) MB")
+    assert [round(camera)] == says("lesson.html", r"Deblur: loads (\d+) MB", folder)
     assert [round(camera)] == says("browser.md", r"A server that compresses sends about (\d+) MB")
     assert lesson < says("lesson.md", r"The other steps load less than (\d+) MB")[0]
     table = says("browser.md", r"size of the folder, compressed \| ([\d.]+) MB, ([\d.]+) MB")
