@@ -3,6 +3,7 @@
 import copy
 import pickle
 import struct
+import sys
 
 import numpy as np
 import pytest
@@ -50,6 +51,12 @@ def test_a_notebook_shows_a_picture_with_a_bar(images):
 def test_other_packages_take_an_image_without_a_copy(images):
     again = np.from_dlpack(images)
     assert np.shares_memory(again, images)
+
+
+def test_a_plot_without_matplotlib_says_what_to_install(images, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(ns.Error, match="plot.. needs matplotlib: pip install matplotlib"):
+        images[0].plot()
 
 
 def test_a_plot_has_a_colour_bar(images):

@@ -172,8 +172,12 @@ class Image(np.ndarray):
         -------
         matplotlib.axes.Axes
         """
-        import matplotlib.pyplot as plt
-
+        try:
+            import matplotlib.pyplot as plt
+        except ImportError as error:
+            raise _nirspi.Error(
+                f"plot() needs matplotlib: pip install matplotlib ({error}); png() needs nothing else"
+            ) from None
         if self.ndim != 2:
             raise _nirspi.Error(f"a stack of shape {self.shape}, expected one image: plot images[k]")
         if ax is None:
