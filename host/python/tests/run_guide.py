@@ -25,9 +25,14 @@ def blocks(text):
         yield text[: block.start(1)].count("\n"), block[1], set(re.findall(r"`([\w-]+)`", " ".join(named)))
 
 
+def plain(name):
+    """A package's name as packages name each other, with one kind of dash."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
 def with_theirs(names):
     """These packages and all that they need themselves."""
-    found, todo = set(), set(names)
+    found, todo = set(), set(map(plain, names))
     while todo:
         name = todo.pop()
         found.add(name)
@@ -35,8 +40,7 @@ def with_theirs(names):
             wanted = importlib.metadata.requires(name) or []
         except importlib.metadata.PackageNotFoundError:
             continue
-        plain = {re.match(r"[\w.-]+", one)[0].lower() for one in wanted if "extra ==" not in one}
-        todo |= plain - found
+        todo |= {plain(re.match(r"[\w.-]+", one)[0]) for one in wanted if "extra ==" not in one} - found
     return found
 
 
@@ -47,7 +51,7 @@ class Hidden:
         self.allowed, self.owners = set(), importlib.metadata.packages_distributions()
 
     def find_spec(self, name, path=None, target=None):
-        owners = {owner.lower() for owner in self.owners.get(name.split(".")[0], [])}
+        owners = {plain(owner) for owner in self.owners.get(name.split(".")[0], [])}
         if owners and not owners & self.allowed:
             raise ModuleNotFoundError(f"the page does not say that this block needs {name}", name=name)
 
