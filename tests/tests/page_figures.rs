@@ -650,6 +650,22 @@ fn figures_of_studies_are_those_of_the_log() {
         "docs/networks.md says nothing is gained at 1 m, the log {at_1_m} dB"
     );
 
+    let log = "docs/log/live-page.md";
+    let off_s = figures(log, "the page said \"off\" for {} s at most while")[0].1;
+    says(
+        "docs/live-page.md",
+        "the page said \"off\" for at most {} s while LEDs were on",
+        &[off_s],
+    );
+    let feed = |row: &str| row_of_log("docs/log/performance.md", "### Feeds", row)[2].clone();
+    let binary = feed("| `capture --camera feed:ADDR`, `f32` | 200 million");
+    let slowest = first(binary.strip_prefix("all recorded, ").unwrap());
+    let sentence = "The program records {} million binary numbers a second";
+    says_about("docs/feeds.md", sentence, slowest, 0.02);
+    let text = feed("| the same, text |");
+    let text = first(text.strip_prefix("all recorded, ").unwrap());
+    says("docs/feeds.md", "or {} million numbers as text, without loss", &[text]);
+
     let cells =
         row_of_log("docs/log/quality.md", "Share of the pixels whose truth", "| hadamard |");
     let coverage: Vec<f64> = cells[1].split(" / ").map(first).collect();
