@@ -650,6 +650,8 @@ fn figures_of_studies_are_those_of_the_log() {
         "docs/networks.md says nothing is gained at 1 m, the log {at_1_m} dB"
     );
 
+    let lost = figures("docs/log/physics.md", "NIR-SPI loses {} dB at 0.3 m (")[0].1;
+    says("docs/rain.md", "covered, a letter at 0.3 m loses {} dB", &[lost]);
     let log = "docs/log/live-page.md";
     let off_s = figures(log, "the page said \"off\" for {} s at most while")[0].1;
     says(
