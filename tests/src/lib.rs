@@ -5,6 +5,7 @@
 pub mod debugger;
 pub mod elf;
 pub mod emulated;
+pub mod figures;
 pub mod firmware;
 pub mod pages;
 pub mod tamper;

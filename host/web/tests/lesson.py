@@ -311,12 +311,17 @@ def sizes(folder):
     lesson, camera = megabytes("lesson.html", "lesson"), megabytes("index.html", "page")
     everything = sum(megabytes(*part, lambda data: data) for part in [("lesson.html", "lesson"), ("index.html", "page")])
     print(f"compressed: lesson {lesson:.2f} MB, camera {camera:.2f} MB; the folder {everything:.2f} MB")
-    assert [round(camera)] == says("lesson.md", r"with its networks, about (\d+) MB")
-    assert [round(camera)] == says("lesson.html", r"Deblur: loads (\d+) MB", folder)
-    assert [round(camera)] == says("browser.md", r"A server that compresses sends about (\d+) MB")
+    # Each change of the program changes its size a little.
+    def is_near(shown, found):
+        assert abs(shown / found - 1) < 0.1, f"a page says {shown} MB, it is {found:.2f} MB"
+
+    is_near(*says("lesson.md", r"with its networks, about (\d+) MB"), camera)
+    is_near(*says("lesson.html", r"Deblur: loads (\d+) MB", folder), camera)
+    is_near(*says("browser.md", r"A server that compresses sends about (\d+) MB"), camera)
     assert lesson < says("lesson.md", r"The other steps load less than (\d+) MB")[0]
     table = says("browser.md", r"size of the folder, compressed \| ([\d.]+) MB, ([\d.]+) MB")
-    assert table == [round(everything, 1), round(lesson + camera, 1)], table
+    for shown, found in zip(table, [everything, lesson + camera], strict=True):
+        is_near(shown, found)
 
 
 def screens(browser, base, folder):
