@@ -39,16 +39,19 @@ const UNSURE: f64 = 1.0 / 64.0;
 const DEVIATION_OF_MEDIAN: f64 = 1.4826;
 
 /// Whether a few patterns see the scene and all others read noise, as with a square on the grid of the patterns, an edge, or
-/// bars. Such readings do not predict each other, whatever patterns they belong to: [`HeldBack`] cannot judge them.
+/// bars. Such readings do not predict each other, whatever patterns they belong to: [`HeldBack`] cannot judge them. Light also
+/// gives the all-ones pattern the largest reading, and single photons of no scene do not.
 #[must_use]
 pub fn few_patterns_see(measurements: &Measurements) -> bool {
-    let readings = measurements.rows().iter().zip(measurements.values());
-    let sizes: Vec<f64> = readings.filter(|(row, _)| **row != 0).map(|(_, v)| v.abs()).collect();
+    let readings = || measurements.rows().iter().zip(measurements.values());
+    let sizes: Vec<f64> = readings().filter(|(row, _)| **row != 0).map(|(_, v)| v.abs()).collect();
     let noise = DEVIATION_OF_MEDIAN * median(sizes.clone());
     let above = |deviations: f64| sizes.iter().filter(|&&v| v > deviations * noise).count();
     let (sees, perhaps) = (above(SEES), above(SEES_NOT));
     let share = |count: usize| count as f64 / sizes.len() as f64;
-    sees > 0 && share(sees) <= FEW && share(perhaps - sees) <= UNSURE
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let is_light = readings().find(|(row, _)| **row == 0).is_none_or(|(_, on)| *on > largest / 2.0);
+    is_light && sees > 0 && share(sees) <= FEW && share(perhaps - sees) <= UNSURE
 }
 
 /// Share of the readings' variation that is confirmed below which another shift is looked for.
@@ -184,6 +187,19 @@ mod tests {
             assert!(!few_patterns_see(&right), "scene {kind}, noise {noise}");
         }
         assert!(!few_patterns_see(&noisy(&natural, &[0.0; 1024], 1.0, 5)));
+        // A photon now and then, with a covered lens.
+        let photons: Vec<f64> = (0..1024)
+            .map(|k| match (k * 7919 + 1) % 1024 {
+                0..20 => 1.0,
+                20..40 => -1.0,
+                _ => 0.0,
+            })
+            .collect();
+        let dark = |on: f64| {
+            let values = [&[on], &photons[1..]].concat();
+            Measurements::from_differential(&natural, &values).unwrap()
+        };
+        assert!(!few_patterns_see(&dark(0.0)) && !few_patterns_see(&dark(-1.0)));
     }
 
     #[test]
