@@ -60,7 +60,9 @@ impl MatrixDoubt {
 mod tests {
     use super::*;
     use crate::reconstruct::{MatrixMethod, MatrixSettings, Penalty};
-    use crate::testing::{binary_patterns, scene, side};
+    use crate::testing::{binary_patterns, normal, scene, side};
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64;
 
     fn judged(own: &OwnMatrix, y: &[f64], method: MatrixMethod) -> Option<MatrixDoubt> {
         let found = own.reconstruct(y, &MatrixSettings::new(method)).unwrap();
@@ -87,6 +89,29 @@ mod tests {
                 assert_eq!(judged(&own, &y[..count], method), later(-1));
                 let (_, others) = binary_patterns(count, &scene(side(16), kind), 0.3, 8);
                 assert_eq!(judged(&own, &others, method), Some(MatrixDoubt::Unexplained));
+            }
+        }
+    }
+
+    #[test]
+    fn a_scene_that_few_patterns_see_is_not_doubted() {
+        // A square on the grid of the patterns, seen by 16 of 256 of them, of which some are left out.
+        let lit = |p: usize| (4..12).contains(&(p / 16)) && (4..12).contains(&(p % 16));
+        let sign = |k: usize, p: usize| 1.0 - 2.0 * f64::from((k & p).count_ones() % 2);
+        for count in [150, 200, 240] {
+            for noise in [0.0, 0.1] {
+                let mut random = Pcg64::seed_from_u64(1);
+                let (mut weights, mut y) = (Vec::new(), Vec::new());
+                for k in (0..count).map(|k| (k * 77) % 256) {
+                    let row: Vec<f64> = (0..256).map(|p| sign(k, p)).collect();
+                    let light = row.iter().enumerate().filter(|(p, _)| lit(*p)).map(|(_, w)| w);
+                    y.push(light.sum::<f64>() + noise * normal(&mut random));
+                    weights.extend(row);
+                }
+                let own = OwnMatrix::new(side(16), &weights).unwrap();
+                for method in [MatrixMethod::Best, MatrixMethod::Penalty(Penalty::Tikhonov)] {
+                    assert_eq!(judged(&own, &y, method), None, "{count} patterns, noise {noise}");
+                }
             }
         }
     }
