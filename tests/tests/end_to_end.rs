@@ -11,7 +11,7 @@ use nirspi::recording::{Recording, RecordingError, Target, hear_recording, tally
 use nirspi::session::{Session, SessionError};
 use nirspi::setup::MeasurementSetup;
 use nirspi::signal::Signal;
-use nirspi::tally::Tally;
+use nirspi::tally::FrameCount;
 use nirspi_optics::{CameraModel, Scene};
 use nirspi_recon::{Order, Rows, Side, fwht, metrics, reconstruct};
 use nirspi_tests::tamper::{Fate, Tampered, only_frames};
@@ -282,11 +282,12 @@ fn a_frame_of_one_sweep_is_corrected_by_what_its_run_tells() {
     let mut recording = Recording::open(&path).unwrap();
     let (setup, settling) = (recording.setup.clone(), recording.settling.clone());
     let mut frames = Vec::new();
-    let tally = hear_recording(&mut recording, |heard, _| {
+    hear_recording(&mut recording, |heard, _| {
         frames.extend(heard.frame().map(|frame| Integrated::of_frame(&setup, frame)));
         Ok::<(), RecordingError>(())
-    });
-    let tally = tally.unwrap();
+    })
+    .unwrap();
+    let tally = tally_recording(&mut Recording::open(&path).unwrap()).unwrap();
     let first_pixel = |frame: &Integrated| {
         let measured = frame.measurements(&setup, settling.as_ref(), false).unwrap();
         let image = reconstruct::hadamard(&measured);
@@ -305,7 +306,7 @@ fn a_frame_of_one_sweep_is_corrected_by_what_its_run_tells() {
 #[test]
 fn an_intact_frame_of_another_setup_is_corrupt() {
     let captured = run(ideal_link(), &options(&Order::CakeCutting, false));
-    let mut tally = Tally::new(&captured.setup, None);
+    let mut count = FrameCount::new(&captured.setup, None);
     let frame = |sequence, words: usize, buffer: &mut [u8]| {
         let samples = Samples::pack(vec![1i64; words].into_iter(), Width::Bits32, buffer).unwrap();
         let (run, flags) = (0, FrameFlags::DIFFERENTIAL);
@@ -317,9 +318,9 @@ fn an_intact_frame_of_another_setup_is_corrupt() {
     };
     let mut buffer = [0; 4096];
     for (sequence, words) in [(0, 1024), (1, 1000), (2, 1024)] {
-        tally.packet(&open(&mut frame(sequence, words, &mut buffer)));
+        count.packet(&open(&mut frame(sequence, words, &mut buffer)));
     }
-    let counters = tally.account().counters();
+    let counters = count.account().counters();
     assert_eq!((counters.received, counters.corrupt, counters.lost), (2, 1, 0));
 }
 

@@ -105,8 +105,9 @@ impl Integrated {
         self.add_alone(frame);
     }
 
-    /// Adds a frame to a sum that does not ask what differs between its frames.
-    pub(crate) fn add_alone(&mut self, frame: &Frame<'_>) {
+    /// Adds a frame that [fits](Self::fits) to a sum that is not asked what differs between its frames: it is one of a run of
+    /// which more is [known](Self::of_run).
+    pub fn add_alone(&mut self, frame: &Frame<'_>) {
         self.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
         self.places[phases::place_of(frame.sequence, frame.sweeps)] += u64::from(frame.sweeps);
         self.flags = self.flags.with(frame.flags);

@@ -1,29 +1,25 @@
 //! The tally of one run, live or from a recording: sums the frames of its packets and makes their
 //! account.
 //!
-//! A recording gives the same tally as the capture that made it.
+//! A recording gives the same tally as the capture that made it. [`FrameCount`] makes the account alone.
 
 use crate::account::{Arrival, Check, LossAccount};
 use crate::integrate::{Changes, Integrated, KnownOfRun, NEWEST, Phases};
 use crate::setup::MeasurementSetup;
 use nirspi_wire::{DeviceMessage, EventKind, Frame, FrameFlags, PacketError};
 use std::collections::VecDeque;
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use thiserror::Error;
 
-/// The sum and the account of a run's packets.
+/// The account of a run's packets.
 #[derive(Debug, Clone)]
-pub struct Tally {
+pub struct FrameCount {
     /// The run that counts; `None` means the run of the first frame.
     run: Option<u16>,
+    patterns: usize,
     differential: bool,
     account: LossAccount,
-    integrated: Integrated,
-    /// Of sweeps that alternate.
-    phases: Option<Phases>,
-    changes: Changes,
-    /// The newest frames, each alone, with their numbers.
-    newest: VecDeque<(u64, Arc<Integrated>)>,
     /// How the first invalid frame contradicts the setup.
     misfit: Option<Misfit>,
     /// The number of frames that the camera reported at the end of the run.
@@ -31,6 +27,18 @@ pub struct Tally {
     device_time_us: u64,
     /// Number of intact messages of a newer protocol version.
     unknown: u64,
+}
+
+/// The sum of a run's frames, and the account of its packets.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    count: FrameCount,
+    integrated: Integrated,
+    /// Of sweeps that alternate.
+    phases: Option<Phases>,
+    changes: Changes,
+    /// The newest frames, each alone, with their numbers.
+    newest: VecDeque<(u64, Arc<Integrated>)>,
 }
 
 /// How an intact frame contradicts the setup.
@@ -63,19 +71,16 @@ fn kind_of_samples(differential: bool) -> &'static str {
     if differential { "differences of patterns and complements" } else { "single patterns" }
 }
 
-impl Tally {
-    /// An empty tally. Frames of another run than `run` are stragglers of earlier runs and do not
+impl FrameCount {
+    /// The count before the first packet. Frames of another run than `run` are stragglers of earlier runs and do not
     /// count. With `None`, the run of the first frame counts.
     #[must_use]
     pub fn new(setup: &MeasurementSetup, run: Option<u16>) -> Self {
         Self {
             run,
+            patterns: setup.rows.len(),
             differential: setup.differential,
             account: LossAccount::new(),
-            integrated: Integrated::new(setup),
-            phases: setup.alternates().then(Phases::default),
-            changes: Changes::default(),
-            newest: VecDeque::new(),
             misfit: None,
             said: None,
             device_time_us: 0,
@@ -83,14 +88,14 @@ impl Tally {
         }
     }
 
-    /// The same tally before its first packet, of the frames from this number on. Earlier frames of
+    /// The same before the first packet, of the frames from this number on. Earlier frames of
     /// the run do not count.
     #[must_use]
     pub fn beginning_at(self, first_frame: u64) -> Self {
         Self { account: LossAccount::beginning_at(first_frame), ..self }
     }
 
-    /// Counts a packet. Returns whether the packet was a frame that was added to the sum.
+    /// Counts a packet. Returns whether the packet is a frame that arrived in order.
     pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
         match content {
             Ok(DeviceMessage::Frame(frame)) => return self.frame(frame),
@@ -124,31 +129,13 @@ impl Tally {
             self.account.damaged(Check::Setup);
             return false;
         }
-        let received = self.account.frame(frame.sequence) == Arrival::Received;
-        if received {
-            self.integrated.add(frame);
-            self.keep(frame);
-            self.changes.add(frame.samples.iter(), frame.sweeps);
-            if let Some(phases) = &mut self.phases {
-                phases.add(frame.sequence, frame.sweeps, frame.samples.iter());
-            }
-        }
-        received
-    }
-
-    /// Keeps a frame alone, in the place of the oldest one that is kept.
-    fn keep(&mut self, frame: &Frame<'_>) {
-        let oldest = if self.newest.len() < NEWEST { None } else { self.newest.pop_front() };
-        let sums = oldest.and_then(|(_, oldest)| Arc::into_inner(oldest));
-        let mut alone = sums.map_or_else(|| self.integrated.empty(), Integrated::emptied);
-        alone.add_alone(frame);
-        self.newest.push_back((frame.sequence.into(), Arc::new(alone)));
+        self.account.frame(frame.sequence) == Arrival::Received
     }
 
     fn misfit_of(&self, frame: &Frame<'_>) -> Option<Misfit> {
         let differential = frame.flags.contains(FrameFlags::DIFFERENTIAL);
-        if !self.integrated.fits(frame) {
-            let (found, expected) = (frame.samples.len(), self.integrated.patterns());
+        let (found, expected) = (frame.samples.len(), self.patterns);
+        if found != expected {
             Some(Misfit::Patterns { found, expected })
         } else if differential != self.differential {
             Some(Misfit::Differential { differential })
@@ -214,6 +201,58 @@ impl Tally {
     #[must_use]
     pub fn unknown_packets(&self) -> u64 {
         self.unknown
+    }
+}
+
+/// A tally counts as its account does.
+impl Deref for Tally {
+    type Target = FrameCount;
+
+    fn deref(&self) -> &FrameCount {
+        &self.count
+    }
+}
+
+impl DerefMut for Tally {
+    fn deref_mut(&mut self) -> &mut FrameCount {
+        &mut self.count
+    }
+}
+
+impl Tally {
+    /// An empty tally of these frames.
+    #[must_use]
+    pub fn new(setup: &MeasurementSetup, count: FrameCount) -> Self {
+        Self {
+            count,
+            integrated: Integrated::new(setup),
+            phases: setup.alternates().then(Phases::default),
+            changes: Changes::default(),
+            newest: VecDeque::new(),
+        }
+    }
+
+    /// Counts a packet. Returns whether the packet was a frame that was added to the sum.
+    pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
+        let counts = self.count.packet(content);
+        if let (true, Ok(DeviceMessage::Frame(frame))) = (counts, content) {
+            self.integrated.add(frame);
+            self.keep(frame);
+            self.changes.add(frame.samples.iter(), frame.sweeps);
+            if let Some(phases) = &mut self.phases {
+                phases.add(frame.sequence, frame.sweeps, frame.samples.iter());
+            }
+        }
+        counts
+    }
+
+    /// Keeps a frame alone, in the place of the oldest one that is kept.
+    fn keep(&mut self, frame: &Frame<'_>) {
+        let oldest = if self.newest.len() < NEWEST { None } else { self.newest.pop_front() };
+        let sums = oldest.and_then(|(_, oldest)| Arc::into_inner(oldest));
+        let mut alone = sums.map_or_else(|| self.integrated.empty(), Integrated::emptied);
+        alone.add_alone(frame);
+        self.newest.push_back((frame.sequence.into(), Arc::new(alone)));
     }
 
     /// The sum of the frames received in order.

@@ -4,8 +4,8 @@ use crate::arrays::array;
 use crate::errors::{of_recording, refused};
 use crate::work::long;
 use nirspi::events;
-use nirspi::recording::Recording;
-use nirspi_wire::{DeviceMessage, open};
+use nirspi::recording::{Recording, RecordingError, hear_recording};
+use nirspi_wire::DeviceMessage;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde::Serialize;
@@ -31,6 +31,18 @@ fn signed(value: u64) -> i64 {
     i64::try_from(value).unwrap_or(i64::MAX)
 }
 
+/// Why a recording is not read to its end.
+enum Ended {
+    Stopped,
+    Recording(RecordingError),
+}
+
+impl From<RecordingError> for Ended {
+    fn from(problem: RecordingError) -> Self {
+        Self::Recording(problem)
+    }
+}
+
 /// Everything in a recording. With `frames` false, the frames are counted and not kept.
 #[pyfunction]
 pub fn read_recording<'py>(
@@ -38,39 +50,37 @@ pub fn read_recording<'py>(
     path: PathBuf,
     frames: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (recording, found, happened, tally) = long(py, |stop| {
+    let (recording, found, happened, count) = long(py, |stop| {
         let mut recording = Recording::open(&path).map_err(of_recording)?;
-        let mut tally = recording.tally();
         let (mut found, mut happened) = (Frames::default(), Vec::new());
-        for packet in &mut recording {
+        let count = hear_recording(&mut recording, |heard, _| {
             if stop.load(Ordering::Relaxed) {
-                return Err(refused("stopped"));
+                return Err(Ended::Stopped);
             }
-            let mut packet = packet.map_err(of_recording)?;
-            if packet.bytes.last() == Some(&0) {
-                packet.bytes.pop();
-            }
-            let content = open(&mut packet.bytes);
-            let counts = tally.packet(&content);
-            match &content {
-                Ok(DeviceMessage::Frame(frame)) if counts && frames => {
+            match (heard.frame(), heard.content) {
+                (Some(frame), _) if frames => {
                     found.sums.extend(frame.samples.iter());
                     found.sequence.push(i64::from(frame.sequence));
                     found.device_time_us.push(signed(frame.device_time_us));
-                    found.time_ns.push(signed(packet.time_ns));
+                    found.time_ns.push(signed(heard.time_ns));
                     found.sweeps.push(i64::from(frame.sweeps));
                     found.flags.push(i64::from(frame.flags.0));
                 }
-                Ok(DeviceMessage::Event(event)) => {
-                    happened.push((packet.time_ns, events::as_it_happens(&event.kind)));
+                (_, Ok(DeviceMessage::Event(event))) => {
+                    happened.push((heard.time_ns, events::as_it_happens(&event.kind)));
                 }
-                Ok(DeviceMessage::Crash(report)) => {
-                    happened.push((packet.time_ns, events::crash(report)));
+                (_, Ok(DeviceMessage::Crash(report))) => {
+                    happened.push((heard.time_ns, events::crash(report)));
                 }
                 _ => {}
             }
-        }
-        Ok((recording, found, happened, tally))
+            Ok(())
+        });
+        let count = count.map_err(|ended| match ended {
+            Ended::Stopped => refused("stopped"),
+            Ended::Recording(problem) => of_recording(problem),
+        })?;
+        Ok((recording, found, happened, count))
     })?;
     let dict = PyDict::new(py);
     dict.set_item("identity", json(&recording.identity)?)?;
@@ -79,10 +89,10 @@ pub fn read_recording<'py>(
     dict.set_item("account", recording.end().account.as_ref().map(json).transpose()?)?;
     dict.set_item("cut_short", recording.end().cut_short.clone())?;
     dict.set_item("packets", recording.end().packets)?;
-    let counted = tally.account().counters();
+    let counted = count.account().counters();
     let counted = (counted.received, counted.lost, counted.corrupt, counted.late);
     dict.set_item("counted", counted)?;
-    dict.set_item("misfit", tally.misfit().map(|misfit| misfit.to_string()))?;
+    dict.set_item("misfit", count.misfit().map(|misfit| misfit.to_string()))?;
     dict.set_item("events", happened)?;
     dict.set_item("sums", array(py, found.sums))?;
     dict.set_item("sequence", array(py, found.sequence))?;

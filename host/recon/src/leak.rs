@@ -127,8 +127,9 @@ fn undo(taps: &[f64], y: &mut [f64], sweep: Sweep) {
     if count == 0 {
         return;
     }
-    let leaked = y.to_vec();
-    let earlier = &taps[1..];
+    // A division for each slot would be waited for by the next slot.
+    let leaked: Vec<f64> = y.iter().map(|y| y / taps[0]).collect();
+    let earlier: Vec<f64> = taps[1..].iter().map(|tap| tap / taps[0]).collect();
     let from_earlier = |x: &[f64], i: usize| -> f64 {
         if let Some(first) = i.checked_sub(earlier.len()) {
             return earlier.iter().zip(x[first..i].iter().rev()).map(|(tap, x)| tap * x).sum();
@@ -145,13 +146,13 @@ fn undo(taps: &[f64], y: &mut [f64], sweep: Sweep) {
     };
     // The first slots depend on the last, so Gauss-Seidel passes follow each other, each of which
     // shrinks the error at least by the leaked share.
-    let share = taps[1..].iter().map(|tap| tap.abs()).sum::<f64>() / taps[0];
+    let share: f64 = earlier.iter().map(|tap| tap.abs()).sum();
     let passes = (f64::EPSILON.ln() / share.ln()).ceil().max(1.0) as usize + 1;
     for pass in 0..passes {
         // Slots one after another that are as the pass before has left them.
         let mut settled = 0;
         for i in 0..count {
-            let x = (leaked[i] - from_earlier(y, i)) / taps[0];
+            let x = leaked[i] - from_earlier(y, i);
             settled = if x == y[i] { settled + 1 } else { 0 };
             y[i] = x;
             // What follows depends on these alone, so it is as the pass before has left it.

@@ -52,18 +52,18 @@ pub(super) fn write(
         let mut pinhole = options.model.as_ref().map(Pinhole::from);
         let known = images.known.clone();
         let mut known = known.iter().peekable();
-        hear_recording(&mut recording, |heard, tally| {
+        hear_recording(&mut recording, |heard, count| {
             pinhole
                 .take()
                 .map_or(Ok(()), |pinhole| book.pinhole(heard.time_ns, &pinhole))
                 .and_then(|()| book.packet(heard.time_ns, heard.raw))
-                .and_then(|()| book.heard(heard.time_ns, heard.content, tally))
+                .and_then(|()| book.heard(heard.time_ns, heard.content, count))
                 .and_then(|()| depth(&mut book, heard, options))
                 .map_err(io_error)?;
             if heard.frame().is_none() {
                 return Ok(());
             }
-            let number = tally.account().accounted() as i64 - 1;
+            let number = count.account().accounted() as i64 - 1;
             match known.next_if(|of| of.last.sequence == number) {
                 Some(of) => image(&mut book, &mut images, of, enhance.as_ref(), (path, out)),
                 None => Ok(()),

@@ -17,8 +17,7 @@ use std::path::{Path, PathBuf};
 const ENHANCED_AT_A_TIME: usize = 256;
 
 /// Images as networks take them, until all of a file are there.
-pub(super) struct ForNetworks<'r> {
-    networks: &'r Networks,
+pub(super) struct ForNetworks {
     pixels: BufWriter<File>,
     /// Images one after another that are alike, of which `levels` has the white level of each.
     alike: Vec<Alike>,
@@ -40,10 +39,10 @@ pub(super) struct Enhanced<'s> {
     pub said: &'s mut AllSaid,
 }
 
-impl<'r> ForNetworks<'r> {
+impl ForNetworks {
     /// None yet. They are kept in this file.
-    pub(super) fn new(networks: &'r Networks, file: File) -> Self {
-        Self { networks, pixels: BufWriter::with_capacity(1 << 16, file), alike: Vec::new() }
+    pub(super) fn new(file: File) -> Self {
+        Self { pixels: BufWriter::with_capacity(1 << 16, file), alike: Vec::new() }
     }
 
     /// Adds an image.
@@ -68,10 +67,11 @@ impl<'r> ForNetworks<'r> {
     /// Enhances all images. Those of a file have one white level.
     pub(super) fn enhance(
         self,
+        networks: &Networks,
         made: &mut Enhanced<'_>,
         watch: Watch<'_>,
     ) -> Result<(), PipelineError> {
-        let Self { networks, pixels, alike } = self;
+        let Self { pixels, alike } = self;
         let wrong = |error| FileError::io(Path::new("images for networks"), "read", error);
         let rewound = || -> io::Result<File> {
             let mut file = pixels.into_inner().map_err(io::IntoInnerError::into_error)?;

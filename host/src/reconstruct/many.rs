@@ -20,6 +20,7 @@ use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
 /// The image of one measurement of one of many files.
@@ -89,19 +90,17 @@ enum NoImage {
 
 /// Makes the image of each measurement of these files: all measurements of a measurement file, the sum
 /// of a recording's frames. With [`SourceOptions::index`], that one measurement of each file, or each
-/// frame of each recording. `side` is that of the images of files before these. `goes_on` is called once a file, from any
-/// thread; if it is false there are no images.
+/// frame of each recording. `goes_on` is called once a file, from any thread; if it is false there are no images.
 pub(super) fn many_images(
     files: &[PathBuf],
     options: &SourceOptions,
-    solver: &Solver,
-    side: Option<usize>,
+    series: &mut Series<'_>,
     goes_on: &(dyn Fn() -> bool + Sync),
 ) -> ManyImages {
     let read: Vec<_> = files.par_iter().map(|file| sources_of(file, options)).collect();
-    let (mut side, mut wrong, mut right) = (side, BTreeMap::new(), Vec::new());
+    let (mut wrong, mut right) = (BTreeMap::new(), Vec::new());
     for (number, (file, read)) in files.iter().zip(read).enumerate() {
-        match read.and_then(|sources| of_one_side(file, sources, &mut side)) {
+        match read.and_then(|sources| of_one_side(file, sources, &mut series.side)) {
             Ok(sources) => right.push(Read { number, file, sources }),
             Err(error) => {
                 wrong.insert(number, error);
@@ -110,13 +109,28 @@ pub(super) fn many_images(
         }
     }
     let pace = Pace::new(&right, goes_on);
-    let images = images_of(&right, solver, &mut wrong, &pace);
+    let images = images_of(&right, series, &mut wrong, &pace);
     let skipped = |(number, error): (usize, NoImage)| {
         let file = files[number].to_string_lossy().into_owned().into();
         Skipped { file, reason: in_one_line(&error) }
     };
     let skipped = wrong.into_iter().map(skipped).collect();
     ManyImages { images, skipped, stopped: pace.stopped.into_inner() }
+}
+
+/// Files of which some are read at a time, and what is known of them so far.
+pub(super) struct Series<'s> {
+    solver: &'s Solver,
+    /// That of the images.
+    pub side: Option<usize>,
+    verdicts: Verdicts,
+}
+
+impl<'s> Series<'s> {
+    /// Files whose images this solver makes.
+    pub(super) fn of(solver: &'s Solver) -> Self {
+        Self { solver, side: None, verdicts: Verdicts::default() }
+    }
 }
 
 /// A file that was read.
@@ -196,14 +210,14 @@ fn sources_of(file: &Path, options: &SourceOptions) -> Result<Vec<Source>, NoIma
 /// The images of all files that give some; the others are added to `wrong`. Where files give none together, each gives its own.
 fn images_of(
     read: &[Read<'_>],
-    solver: &Solver,
+    series: &Series<'_>,
     wrong: &mut BTreeMap<usize, NoImage>,
     pace: &Pace<'_>,
 ) -> Vec<FileImage> {
-    if let Ok(images) = together(read, solver, pace) {
+    if let Ok(images) = together(read, series, pace) {
         return images;
     }
-    let alone = |read: &Read<'_>| together(std::slice::from_ref(read), solver, pace);
+    let alone = |read: &Read<'_>| together(std::slice::from_ref(read), series, pace);
     let made: Vec<_> = read.par_iter().map(alone).collect();
     let mut all = Vec::new();
     if pace.stopped.load(Ordering::Relaxed) {
@@ -221,7 +235,7 @@ fn images_of(
 /// The images of all measurements of these files, in their order.
 fn together(
     read: &[Read<'_>],
-    solver: &Solver,
+    series: &Series<'_>,
     pace: &Pace<'_>,
 ) -> Result<Vec<FileImage>, SolverError> {
     let Some(first) = read.first() else { return Ok(Vec::new()) };
@@ -232,34 +246,51 @@ fn together(
     // Parts of complex readings are made together: those of files that have both.
     let (complex, real): (Vec<usize>, Vec<usize>) =
         (0..all.len()).partition(|&at| all[at].2.imaginary.is_some());
-    let (mut made, mut verdicts) = (BTreeMap::new(), Verdicts::default());
+    let mut made = BTreeMap::new();
     for places in [complex, real] {
         let sources: Vec<&Source> = places.iter().map(|&at| all[at].2).collect();
-        let solved = solver.solve_all(first.file, &sources, false, &|| pace.before_image())?;
+        let solved =
+            series.solver.solve_all(first.file, &sources, false, &|| pace.before_image())?;
         for (at, solved) in places.into_iter().zip(solved) {
             let (file, index, source) = all[at];
-            let warnings = verdicts.warnings(source, &solved.report);
+            let warnings = series.verdicts.warnings(source, &solved.report);
             made.insert(at, file_image((file, index), source, solved, warnings));
         }
     }
     Ok(made.into_values().collect())
 }
 
-/// The doubts about measurements, found out once for those that held-back readings say the same of: those of one kind.
+/// The doubts about measurements of files, found out once for those of the same patterns of which held-back readings confirm
+/// about the same share.
 #[derive(Default)]
-struct Verdicts(HashMap<([u64; 3], [bool; 2]), Vec<String>>);
+struct Verdicts(Mutex<HashMap<(Rows, [bool; 2]), Vec<Verdict>>>);
+
+/// What held-back readings say of measurements, and the doubts about them.
+type Verdict = (HeldBack, Vec<String>);
+
+/// Difference of the confirmed shares from which the doubts about measurements are found out for each.
+const ANOTHER_SHARE: f64 = 0.05;
 
 impl Verdicts {
     /// What a user must know of an image.
-    fn warnings(&mut self, source: &Source, report: &MethodReport) -> Vec<String> {
-        let Some(HeldBack { miss, confirmed, score }) = report.made.held_back else {
-            return all_warnings(source, report);
-        };
+    fn warnings(&self, source: &Source, report: &MethodReport) -> Vec<String> {
+        let Some(found) = report.made.held_back else { return all_warnings(source, report) };
         // What is doubted also depends on these.
         let of_source = [source.warnings.is_empty(), source.frames.is_some()];
-        let kind = [miss, confirmed, score].map(f64::to_bits);
-        let doubts = self.0.entry((kind, of_source)).or_insert_with(|| doubts(source, report));
-        source.all_warnings().into_iter().chain(doubts.iter().cloned()).collect()
+        let of = (source.measurements.rows().clone(), of_source);
+        let is_alike = |(one, _): &&Verdict| {
+            one.is_by_chance() == found.is_by_chance()
+                && (one.confirmed - found.confirmed).abs() < ANOTHER_SHARE
+        };
+        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = all().get(&of).and_then(|known| known.iter().find(is_alike).cloned());
+        // Not while others wait: finding out takes the other threads too.
+        let (_, doubts) = known.unwrap_or_else(|| {
+            let verdict = (found, doubts(source, report));
+            all().entry(of).or_default().push(verdict.clone());
+            verdict
+        });
+        source.all_warnings().into_iter().chain(doubts).collect()
     }
 }
 
@@ -397,7 +428,7 @@ mod tests {
         let sources: Vec<Source> = files.iter().map(|file| read(file)).collect();
         for method in [Method::HADAMARD, Method::TIKHONOV] {
             let solver = solver_of(method);
-            let made = many_images(&files, &options, &solver, None, &|| {
+            let made = many_images(&files, &options, &mut Series::of(&solver), &|| {
                 asked.fetch_add(1, Ordering::Relaxed);
                 true
             });
@@ -411,7 +442,7 @@ mod tests {
             assert_ne!(made.images[0].image.pixels(), made.images[1].image.pixels());
         }
         assert_eq!(asked.into_inner(), 80, "once a file");
-        let made = many_images(&files, &options, &solver(), None, &|| false);
+        let made = many_images(&files, &options, &mut Series::of(&solver()), &|| false);
         assert!(made.stopped && made.images.is_empty() && made.skipped.is_empty());
     }
 
@@ -421,7 +452,8 @@ mod tests {
         let files: Vec<PathBuf> = (0..20).map(|k| measured(folder.path(), k, 8)).collect();
         let dictionary = Some(folder.path().join("gone.npy"));
         let solver = Solver::new(Recipe { dictionary, ..recipe_of(Method::OMP) }).unwrap();
-        let made = many_images(&files, &SourceOptions::default(), &solver, None, &|| true);
+        let made =
+            many_images(&files, &SourceOptions::default(), &mut Series::of(&solver), &|| true);
         assert!(made.images.is_empty() && !made.stopped);
         assert!(made.skipped.iter().map(|skipped| &skipped.file).eq(&files));
         assert!(made.skipped.iter().all(|skipped| skipped.reason.contains("gone.npy")));
@@ -443,14 +475,18 @@ mod tests {
             (0..10).map(|k| write(&format!("{k}.csv"), &of_no_scene)).collect();
         files.push(write("bright.csv", &|row| 100.0 * corner(row)));
         let solver = solver_of(Method::TIKHONOV);
-        let made = many_images(&files, &SourceOptions::default(), &solver, None, &|| true);
+        let mut series = Series::of(&solver);
         let is_doubt = |warning: &&String| warning.contains("no better than chance");
-        let doubts: Vec<usize> = made
-            .images
-            .iter()
-            .map(|image| image.warnings.iter().filter(is_doubt).count())
-            .collect();
-        assert_eq!(doubts, [[1; 10].as_slice(), &[0]].concat());
+        let mut doubts = |files: &[PathBuf]| -> Vec<usize> {
+            let made = many_images(files, &SourceOptions::default(), &mut series, &|| true);
+            let doubts = |image: &FileImage| image.warnings.iter().filter(is_doubt).count();
+            made.images.iter().map(doubts).collect()
+        };
+        assert_eq!(doubts(&files), [[1; 10].as_slice(), &[0]].concat());
+        // Files after them are known.
+        assert_eq!(doubts(&files[5..]), [1, 1, 1, 1, 1, 0]);
+        let known = series.verdicts.0.into_inner().unwrap();
+        assert_eq!(known.values().map(Vec::len).collect::<Vec<_>>(), [2]);
     }
 
     #[test]
@@ -460,7 +496,8 @@ mod tests {
         let other_side = measured(folder.path(), 3, 4);
         let gone = folder.path().join("gone.csv");
         let files = [first.clone(), gone.clone(), other_side.clone(), last.clone()];
-        let made = many_images(&files, &SourceOptions::default(), &solver(), None, &|| true);
+        let made =
+            many_images(&files, &SourceOptions::default(), &mut Series::of(&solver()), &|| true);
         let with: Vec<&PathBuf> = made.images.iter().map(|image| &image.file).collect();
         let without: Vec<&PathBuf> = made.skipped.iter().map(|skipped| &skipped.file).collect();
         assert_eq!((with, without), (vec![&first, &last], vec![&gone, &other_side]));

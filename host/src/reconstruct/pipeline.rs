@@ -18,7 +18,7 @@
 //! The program `nirspi` gives the pictures that a program of this kind gives, for one measurement and for stacks
 //! (`one_recording_gives_one_picture_through_every_door` in `host/cli/tests/cli/doors.rs`).
 
-use super::many::{FileImage, Part, file_images, many_images};
+use super::many::{FileImage, Part, Series, file_images, many_images};
 use super::one::{OneReport, one_image};
 use super::pipeline_error::PipelineError;
 use super::stack::{StackReport, Writing};
@@ -30,6 +30,8 @@ use nirspi_recon::Backend;
 use nirspi_recon::reconstruct::{AT_A_TIME, ReconstructError};
 use nirspi_recon::words::count_of;
 use std::path::PathBuf;
+use std::sync::mpsc::sync_channel;
+use std::thread;
 
 /// Files whose readings are in memory together, and are one stack: many small ones, fewer large ones. `side` is that of their
 /// images, if it is known.
@@ -94,26 +96,22 @@ impl Pipeline {
             true => sources.fit_together().map(|()| usize::MAX)?,
             false => AT_A_TIME,
         };
-        let several = sources.len() > 1;
-        let (mut writing, mut ended, mut from) = (None, None, 0);
+        let (several, mut from) = (sources.len() > 1, 0);
         let mut batches = sources.batches(most)?;
-        while let Some(batch) = times.time("read", || batches.next()) {
+        let (writing, ended) = self.writing_beside(folder, &mut times, |times| {
+            let batch = times.time("read", || batches.next())?;
             let part = Part { from, several };
             let images = batch.map_err(PipelineError::from).and_then(|batch| {
                 times.time("reconstruct", || self.batch(&batch, part, folder, watch))
             });
-            let added = images.and_then(|images| {
-                from += images.len();
-                self.add(&mut writing, &images, folder, &mut times)
-            });
-            if let Err(error) = added {
-                ended = Some(error);
-                break;
-            }
-        }
+            from += images.as_ref().map_or(0, Vec::len);
+            Some(images)
+        });
         drop(batches);
         match writing {
-            Some(writing) => writing.finish(Vec::new(), ended, watch, times),
+            Some(writing) => {
+                writing.finish(Vec::new(), ended, self.networks.as_ref(), watch, times)
+            }
             None => Err(ended.unwrap_or_else(|| PipelineError::Empty(folder.input.to_owned()))),
         }
     }
@@ -132,24 +130,24 @@ impl Pipeline {
         watch: Watch<'_>,
         mut times: StageTimes,
     ) -> Result<StackReport, PipelineError> {
-        let (mut writing, mut skipped, mut side, mut ended) = (None, Vec::new(), None, None);
-        let mut left = files;
-        while !left.is_empty() {
-            let (some, rest) = left.split_at(files_at_a_time(side).min(left.len()));
+        let (mut skipped, mut left) = (Vec::new(), files);
+        let mut series = Series::of(&self.solver);
+        let (writing, ended) = self.writing_beside(folder, &mut times, |times| {
+            let (some, rest) = left.split_at(files_at_a_time(series.side).min(left.len()));
             left = rest;
-            let goes_on = || watch(Step::Reconstruct);
-            let made = times
-                .time("reconstruct", || many_images(some, options, &self.solver, side, &goes_on));
-            side = side.or_else(|| made.images.first().map(|image| image.image.side().pixels()));
-            skipped.extend(made.skipped);
-            let added = self.add(&mut writing, &made.images, folder, &mut times);
-            ended = added.err().or(made.stopped.then_some(PipelineError::Stopped));
-            if ended.is_some() {
-                break;
+            if some.is_empty() {
+                return None;
             }
-        }
+            let goes_on = || watch(Step::Reconstruct);
+            let made =
+                times.time("reconstruct", || many_images(some, options, &mut series, &goes_on));
+            skipped.extend(made.skipped);
+            Some(if made.stopped { Err(PipelineError::Stopped) } else { Ok(made.images) })
+        });
         match (writing, ended) {
-            (Some(writing), ended) => writing.finish(skipped, ended, watch, times),
+            (Some(writing), ended) => {
+                writing.finish(skipped, ended, self.networks.as_ref(), watch, times)
+            }
             (None, Some(ended)) => Err(ended),
             (None, None) => {
                 let reason = skipped.into_iter().next().map(|skipped| skipped.reason);
@@ -159,20 +157,51 @@ impl Pipeline {
         }
     }
 
-    /// Writes images to the disk.
-    fn add<'p>(
-        &'p self,
-        writing: &mut Option<Writing<'p>>,
-        images: &[FileImage],
+    /// Writes the images that `next` makes until it makes none or fails, while it makes those after them. Also gives the error
+    /// that ended them, of making or of writing.
+    fn writing_beside<'p>(
+        &self,
         folder: &'p ResultFolder<'p>,
         times: &mut StageTimes,
-    ) -> Result<(), PipelineError> {
-        let Some(first) = images.first() else { return Ok(()) };
-        let writing = match writing {
-            Some(writing) => writing,
-            None => writing.insert(Writing::new(folder, self.networks.as_ref(), first)?),
-        };
-        times.time("write", || writing.add(images))
+        mut next: impl FnMut(&mut StageTimes) -> Option<Result<Vec<FileImage>, PipelineError>>,
+    ) -> (Option<Writing<'p>>, Option<PipelineError>) {
+        let (to, from) = sync_channel::<Vec<FileImage>>(0);
+        let enhanced = self.networks.is_some();
+        thread::scope(|scope| {
+            let writer = scope.spawn(move || {
+                let mut writing = None;
+                let write = |images: Vec<FileImage>| {
+                    let Some(first) = images.first() else { return Ok(()) };
+                    let writing = match &mut writing {
+                        Some(writing) => writing,
+                        none => none.insert(Writing::new(folder, enhanced, first)?),
+                    };
+                    writing.add(&images)
+                };
+                let failed = from.iter().map(write).find_map(Result::err);
+                (writing, failed)
+            });
+            let mut ended = None;
+            while let Some(images) = next(times) {
+                match images {
+                    Ok(images) => {
+                        if times.time("write", || to.send(images)).is_err() {
+                            // Writing has failed.
+                            break;
+                        }
+                    }
+                    Err(error) => {
+                        ended = Some(error);
+                        break;
+                    }
+                }
+            }
+            drop(to);
+            let (writing, failed) = times
+                .time("write", || writer.join())
+                .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            (writing, failed.or(ended))
+        })
     }
 
     /// The images of some measurements of a file.

@@ -109,7 +109,7 @@ struct ImageReport<'i> {
 /// A stack that is being written.
 pub(super) struct Writing<'r> {
     folder: &'r ResultFolder<'r>,
-    networks: Option<ForNetworks<'r>>,
+    for_networks: Option<ForNetworks>,
     images: Images,
     reports: Writer,
     origin: Origin,
@@ -125,16 +125,16 @@ pub(super) struct Writing<'r> {
 }
 
 impl<'r> Writing<'r> {
-    /// Begins a stack of images like this one.
+    /// Begins a stack of images like this one, which networks will enhance if `enhanced`.
     pub(super) fn new(
         folder: &'r ResultFolder<'r>,
-        networks: Option<&'r Networks>,
+        enhanced: bool,
         first: &FileImage,
     ) -> Result<Self, FileError> {
         let out = OutputDir::create(folder.out)?;
-        let networks = match networks {
-            Some(networks) => Some(ForNetworks::new(networks, out.scratch()?)),
-            None => None,
+        let for_networks = match enhanced {
+            true => Some(ForNetworks::new(out.scratch()?)),
+            false => None,
         };
         let n = first.image.side().pixels();
         Ok(Self {
@@ -149,13 +149,13 @@ impl<'r> Writing<'r> {
             whole: 0,
             folder,
             out,
-            networks,
+            for_networks,
         })
     }
 
     /// Adds images, all of the side of the first one.
     pub(super) fn add(&mut self, images: &[FileImage]) -> Result<(), PipelineError> {
-        if self.networks.is_some() && images.iter().any(|image| image.complex) {
+        if self.for_networks.is_some() && images.iter().any(|image| image.complex) {
             return Err(PipelineError::Complex);
         }
         self.write(images).map_err(|error| FileError::io(self.folder.out, "write to", error))?;
@@ -186,20 +186,21 @@ impl<'r> Writing<'r> {
                 notes: &image.notes,
             })?;
             self.images.push(image.image.pixels())?;
-            if let Some(networks) = &mut self.networks {
-                networks.push(image)?;
+            if let Some(for_networks) = &mut self.for_networks {
+                for_networks.push(image)?;
             }
         }
         self.reports.flush()?;
         self.images.flush()
     }
 
-    /// Enhances the images if that is asked for, and writes the pictures and the report. `ended` says why there are no
+    /// Enhances the images by these networks, if there are any, and writes the pictures and the report. `ended` says why there are no
     /// more images; where a disk was full, there may be fewer.
     pub(super) fn finish(
         mut self,
         skipped: Vec<Skipped>,
         mut ended: Option<PipelineError>,
+        networks: Option<&Networks>,
         watch: Watch<'_>,
         mut times: StageTimes,
     ) -> Result<StackReport, PipelineError> {
@@ -212,13 +213,13 @@ impl<'r> Writing<'r> {
             None => self.reports.finish().map(|reports| (self.images, reports)),
             Some(full) => {
                 // Their images need more space than there is.
-                self.networks = None;
+                self.for_networks = None;
                 those_that_fit(self.images, self.reports, self.whole, full)
             }
         };
         let (mut images, mut frames) = all.map_err(wrong)?;
         let mut enhanced = None;
-        if let Some(networks) = self.networks.take() {
+        if let Some((images, networks)) = self.for_networks.take().zip(networks) {
             let pixels = Images::new(&self.out, "enhanced.npy", (deblur::SIDE, deblur::SIDE))?;
             let mut made = Enhanced {
                 pixels,
@@ -226,7 +227,7 @@ impl<'r> Writing<'r> {
                 warned: Vec::new(),
                 said: &mut self.said,
             };
-            let work = || networks.enhance(&mut made, watch);
+            let work = || images.enhance(networks, &mut made, watch);
             let worked = times.time("enhance", work);
             let Enhanced { pixels, reports, warned, .. } = made;
             match worked {

@@ -65,7 +65,7 @@ pub struct Frames<'a> {
     flat_field: FlatFieldRead,
 }
 
-/// Neighbouring frames that were added, or one of them alone.
+/// Neighbouring frames that were added, or one of them alone. What their readings differ by is known of the whole run.
 pub(crate) struct Added {
     sum: Integrated,
     /// The newest of several frames of a scene that changes, each alone, with their numbers.
@@ -92,11 +92,8 @@ impl<'a> Frames<'a> {
     /// Reads the recording once: what its frames tell of each other, and how many there are.
     pub(crate) fn open(path: &'a Path, options: &'a SourceOptions) -> Result<Self, SourceError> {
         let mut recording = Recording::open(path)?;
-        let mut count = 0;
-        let tally = hear_recording(&mut recording, |heard, _| {
-            count += usize::from(heard.frame().is_some());
-            Ok::<(), SourceError>(())
-        })?;
+        let tally = tally_recording(&mut recording)?;
+        let count = tally.integrated().frames() as usize;
         if count == 0 {
             return Err(no_frame(path, &tally));
         }
@@ -141,10 +138,10 @@ impl<'a> Frames<'a> {
         let (to, from) = sync_channel(0);
         let read = move || {
             let (mut batch, mut seen) = (Vec::new(), 0);
-            let heard = hear_recording(&mut recording, |heard, tally| {
+            let heard = hear_recording(&mut recording, |heard, count| {
                 let Some(frame) = heard.frame() else { return Ok(()) };
                 let stamp = Stamp {
-                    sequence: tally.account().accounted() as i64 - 1,
+                    sequence: count.account().accounted() as i64 - 1,
                     device_time_us: frame.device_time_us,
                     time_ns: heard.time_ns,
                 };
@@ -206,7 +203,9 @@ impl<'a> Frames<'a> {
 
 impl Added {
     fn of(setup: &MeasurementSetup, frame: &Frame<'_>, last: Stamp) -> Self {
-        Self { sum: Integrated::of_frame(setup, frame), newest: VecDeque::new(), last }
+        let mut sum = Integrated::new(setup);
+        sum.add_alone(frame);
+        Self { sum, newest: VecDeque::new(), last }
     }
 
     /// Adds a frame; where the scene `changes`, also keeps it alone for a while.
@@ -221,7 +220,7 @@ impl Added {
             }
             newest.push_back((at.sequence as u64, Arc::new(Integrated::of_frame(setup, frame))));
         }
-        sum.add(frame);
+        sum.add_alone(frame);
         *last = at;
     }
 

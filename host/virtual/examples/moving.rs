@@ -7,7 +7,7 @@
 use nirspi::capture::{Calibration, CaptureOptions, Record, capture};
 use nirspi::integrate::Integrated;
 use nirspi::provenance::Made;
-use nirspi::recording::{Recording, RecordingError, Target, hear_recording};
+use nirspi::recording::{Recording, RecordingError, Target, hear_recording, tally_recording};
 use nirspi::scene::SceneSource;
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
@@ -60,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut session = Session::open(Box::new(MemoryLink::new(optics.camera(1)?)))?;
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(()))?;
     let (mut sums, mut times) = (Vec::new(), Vec::new());
-    let tally = hear_recording(&mut Recording::open(&path)?, |heard, _| {
+    hear_recording(&mut Recording::open(&path)?, |heard, _| {
         if let Some(frame) = heard.frame() {
             let mut alone = Integrated::new(&setup);
             alone.add(frame);
@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         Ok::<(), RecordingError>(())
     })?;
-    let known = tally.known();
+    let known = tally_recording(&mut Recording::open(&path)?)?.known();
     let measured: Vec<Measurements> = sums
         .iter()
         .map(|sum| sum.clone().of_run(&known).measurements(&setup, Some(&settling), false))

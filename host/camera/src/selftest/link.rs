@@ -46,7 +46,7 @@ fn setup(sweeps: u32) -> MeasurementSetup {
 pub fn check(session: &mut Session, demands: LinkDemands) -> Result<Vec<Check>, SessionError> {
     let fastest = stream(session, &setup(1), demands.duration)?;
     let seconds = fastest.elapsed.as_secs_f64();
-    let received = fastest.tally.account().counters().received;
+    let received = fastest.count.account().counters().received;
     if received == 0 {
         let skipped = Check::skipped(LOSSES, "no frame came");
         return Ok(vec![Check::told(SPEED, false, "no frame came"), skipped]);
@@ -80,7 +80,7 @@ pub fn check(session: &mut Session, demands: LinkDemands) -> Result<Vec<Check>, 
         sweeps = (2 * sweeps).min(most_sweeps);
         paced = stream(session, &setup(sweeps), demands.duration)?;
     }
-    let counters = paced.tally.account().counters();
+    let counters = paced.count.account().counters();
     let missing = counters.total() - counters.received;
     let status = paced.status;
     let mut note = format!("of {} at {:.0} frames/s", counters.total(), pace(sweeps));

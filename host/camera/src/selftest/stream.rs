@@ -2,7 +2,7 @@
 
 use crate::session::{ANSWER_TIMEOUT, IgnorePackets, Listener, Session, SessionError, request};
 use crate::setup::MeasurementSetup;
-use crate::tally::Tally;
+use crate::tally::FrameCount;
 use nirspi_wire::{Configuration, DeviceMessage, EventKind, PacketError, RunLength, Status};
 use std::time::{Duration, Instant};
 
@@ -79,7 +79,7 @@ pub fn shots(
 #[derive(Debug)]
 pub struct Stream {
     /// The account of all frames.
-    pub tally: Tally,
+    pub count: FrameCount,
     /// Bytes of all packets on the link.
     pub bytes: u64,
     /// Time from start to stop.
@@ -94,14 +94,14 @@ impl Stream {
     /// Frames that arrived in a second of the camera's clock; `None` if there are too few to say.
     pub fn frames_per_device_s(&self) -> Option<f64> {
         let (first, last) = self.device_us?;
-        let frames = self.tally.arrived().saturating_sub(1);
+        let frames = self.count.arrived().saturating_sub(1);
         let seconds = last.saturating_sub(first) as f64 * 1e-6;
         (frames > 0 && seconds > 0.0).then(|| frames as f64 / seconds)
     }
 }
 
 struct Counter {
-    tally: Tally,
+    count: FrameCount,
     bytes: u64,
     last_packet: Instant,
     device_us: Option<(u64, u64)>,
@@ -111,8 +111,8 @@ impl Listener for Counter {
     fn packet(&mut self, raw: &[u8], content: &Result<DeviceMessage<'_>, PacketError>) {
         self.last_packet = Instant::now();
         self.bytes += raw.len() as u64;
-        if self.tally.packet(content) {
-            let now = self.tally.device_time_us();
+        if self.count.packet(content) {
+            let now = self.count.device_time_us();
             let (first, _) = self.device_us.unwrap_or((now, now));
             self.device_us = Some((first, now));
         }
@@ -128,19 +128,19 @@ pub fn stream(
     setup.with_configuration(|c| session.command(request::Configure(c), &mut IgnorePackets))?;
     let run = session.status(&mut IgnorePackets)?.run.wrapping_add(1);
     let started = Instant::now();
-    let tally = Tally::new(setup, Some(run));
-    let mut counter = Counter { tally, bytes: 0, last_packet: started, device_us: None };
+    let count = FrameCount::new(setup, Some(run));
+    let mut counter = Counter { count, bytes: 0, last_packet: started, device_us: None };
     session.command(request::Start(RunLength::Continuous), &mut counter)?;
     let (mut kept_alive, mut kept_alive_us) = (started, 0);
-    let has_enough = |tally: &Tally| {
-        let least = if tally.arrived() < LEAST_FRAMES { LONGEST } else { duration };
+    let has_enough = |count: &FrameCount| {
+        let least = if count.arrived() < LEAST_FRAMES { LONGEST } else { duration };
         started.elapsed() >= least.max(duration)
     };
-    while !has_enough(&counter.tally) && !counter.tally.has_ended() {
+    while !has_enough(&counter.count) && !counter.count.has_ended() {
         session.listen(Duration::from_millis(20), &mut counter)?;
         // The time of a simulated camera may run faster than the host's, and the camera measures
         // the host's silence.
-        let device_us = counter.tally.device_time_us();
+        let device_us = counter.count.device_time_us();
         let device_age = Duration::from_micros(device_us.saturating_sub(kept_alive_us));
         if kept_alive.elapsed() > KEEP_ALIVE || device_age > KEEP_ALIVE {
             (kept_alive, kept_alive_us) = (Instant::now(), device_us);
@@ -153,14 +153,14 @@ pub fn stream(
         Ok(()) | Err(SessionError::Refused { .. }) => {}
         Err(error) => return Err(error),
     }
-    while !counter.tally.has_ended() && counter.last_packet.elapsed() < ANSWER_TIMEOUT {
+    while !counter.count.has_ended() && counter.last_packet.elapsed() < ANSWER_TIMEOUT {
         session.listen(Duration::from_millis(20), &mut counter)?;
     }
     let status = session.status(&mut counter)?;
     // The packet with the end of the run may be lost.
-    if !counter.tally.has_ended() {
-        counter.tally.end(status.frames_made);
+    if !counter.count.has_ended() {
+        counter.count.end(status.frames_made);
     }
-    let Counter { tally, device_us, .. } = counter;
-    Ok(Stream { tally, bytes, elapsed, status, device_us })
+    let Counter { count, device_us, .. } = counter;
+    Ok(Stream { count, bytes, elapsed, status, device_us })
 }

@@ -4,6 +4,7 @@ use super::explanation::{Explanation, MOST_READINGS};
 use super::{HeldBack, Method, MethodSettings};
 use crate::law::robust::median;
 use crate::{Measurements, Order, Rows, Side};
+use rayon::prelude::*;
 
 /// The shift or the named order under which the readings predict each other best, if one does far
 /// better than chance; for readings that are [predicted by chance](HeldBack::is_by_chance) alone as
@@ -17,9 +18,7 @@ pub fn explanation(measurements: &Measurements) -> Option<Explanation> {
         let first = order.rows(side).ok()?.first(rows.len()).to_vec();
         Some((Explanation::Order(order), first, 0))
     });
-    let tried = shifts(rows).chain(orders);
-    let tried: Vec<(Explanation, HeldBack)> =
-        tried.filter_map(|trial| judged(measurements, trial)).collect();
+    let tried = all_judged(measurements, shifts(rows).chain(orders));
     let best = tried.iter().map(|(_, found)| found.score).fold(f64::NEG_INFINITY, f64::max);
     // An order and its transpose explain a symmetrical scene equally well.
     let named = tried.into_iter().find(|(_, found)| found.score >= 0.9 * best);
@@ -71,10 +70,10 @@ pub fn better_shift(
     if found.confirmed >= LITTLE || few_patterns_see(measurements) {
         return None;
     }
-    let tried = shifts(measurements.rows()).filter_map(|trial| judged(measurements, trial));
+    let tried = all_judged(measurements, shifts(measurements.rows()));
     // The few largest readings of a scene may be predicted under any shift; the signs of all are not.
     let least = HeldBack::AMONG_MANY.max(found.score);
-    let named = tried.filter(|(_, trial)| trial.score >= least);
+    let named = tried.into_iter().filter(|(_, trial)| trial.score >= least);
     let (shift, best) = named.max_by(|(_, a), (_, b)| a.confirmed.total_cmp(&b.confirmed))?;
     let is_far_better = 1.0 - best.confirmed < FAR_LESS * (1.0 - found.confirmed);
     is_far_better.then_some((shift, best))
@@ -92,6 +91,15 @@ fn shifts(rows: &[u32]) -> impl Iterator<Item = Trial> + '_ {
         (Explanation::Shift(-(by as i32)), patterns, by)
     });
     late.chain(early)
+}
+
+/// What held-back readings say of each explanation, in their order.
+fn all_judged(
+    measurements: &Measurements,
+    trials: impl Iterator<Item = Trial>,
+) -> Vec<(Explanation, HeldBack)> {
+    let trials: Vec<Trial> = trials.collect();
+    trials.into_par_iter().filter_map(|trial| judged(measurements, trial)).collect()
 }
 
 /// What held-back readings say of an explanation.

@@ -12,7 +12,7 @@ use super::missing::lacking;
 use crate::recording::{Opening, Part, Recorder, RunAccount, Split, Target, name_of, part_path};
 use nirspi_camera::response::Settling;
 use nirspi_camera::setup::MeasurementSetup;
-use nirspi_camera::tally::Tally;
+use nirspi_camera::tally::FrameCount;
 use nirspi_files::identity::CameraIdentity;
 use nirspi_files::provenance::Provenance;
 use nirspi_wire::{DeviceMessage, PacketError};
@@ -45,9 +45,9 @@ impl Head {
         )
     }
 
-    /// The tally of the frames from this one on.
-    fn tally(&self, first_frame: u64) -> Tally {
-        Tally::new(&self.setup, Some(self.run)).beginning_at(first_frame)
+    /// The count of the frames from this one on.
+    fn count(&self, first_frame: u64) -> FrameCount {
+        FrameCount::new(&self.setup, Some(self.run)).beginning_at(first_frame)
     }
 }
 
@@ -78,7 +78,7 @@ struct Splitting {
     /// The number of the current file.
     number: u32,
     /// The frames of the current file.
-    tally: Tally,
+    count: FrameCount,
     /// Whether the newest packet was a frame that arrived in order.
     is_after_frame: bool,
     /// When the current file began, in ns of the host's clock.
@@ -119,7 +119,7 @@ impl RunRecorder {
                 Target::Parts(whole, _) => whole.clone(),
                 _ => whole_of(current.path()),
             },
-            tally: head.tally(0),
+            count: head.count(0),
             head: Arc::new(head),
             number: 1,
             is_after_frame: false,
@@ -157,7 +157,7 @@ impl RunRecorder {
         self.current.packet(raw)
     }
 
-    /// Writes what the newest packet means. `tally` has counted the packet, and `received` says whether
+    /// Writes what the newest packet means. `count` has counted the packet, and `received` says whether
     /// the packet was a frame that arrived in order.
     ///
     /// # Errors
@@ -165,12 +165,12 @@ impl RunRecorder {
     pub(super) fn heard(
         &mut self,
         content: &Result<DeviceMessage<'_>, PacketError>,
-        tally: &Tally,
+        count: &FrameCount,
         received: bool,
     ) -> io::Result<()> {
-        self.current.heard(content, tally)?;
+        self.current.heard(content, count)?;
         if let Some(splitting) = &mut self.splitting {
-            splitting.tally.packet(content);
+            splitting.count.packet(content);
             splitting.is_after_frame = received;
         }
         Ok(())
@@ -206,17 +206,17 @@ impl RunRecorder {
         self,
         failed: Option<io::Error>,
         account: RunAccount,
-        lacks: impl Fn(&Tally) -> Option<String>,
+        lacks: impl Fn(&FrameCount) -> Option<String>,
     ) -> Recorded {
         let Self { current, splitting } = self;
         let (mut files, mut earlier, mut account) = (Vec::new(), None, account);
         if let Some(mut splitting) = splitting {
             // The packet with the end of the run may have been damaged.
-            if let (Some(made), false) = (account.made, splitting.tally.has_ended()) {
-                splitting.tally.end(made as u32);
+            if let (Some(made), false) = (account.made, splitting.count.has_ended()) {
+                splitting.count.end(made as u32);
             }
-            account.counters = splitting.tally.account().counters();
-            account.missing = lacks(&splitting.tally);
+            account.counters = splitting.count.account().counters();
+            account.missing = lacks(&splitting.count);
             (files, earlier) = splitting.end();
             if let Some((path, error)) = &earlier {
                 let problem = format!("{} could not be recorded: {error}", name_of(path));
@@ -296,7 +296,7 @@ impl Splitting {
 
     /// Goes on in `next`, and closes the current file.
     fn change(&mut self, current: &mut Recorder, mut next: Recorder) -> io::Result<()> {
-        let first_frame = self.tally.account().accounted();
+        let first_frame = self.count.account().accounted();
         let number = self.number + 1;
         let place = Part { number, first_frame, follows: Some(name_of(current.path())) };
         if let Err(error) = next.follow(Some(current), &place) {
@@ -304,15 +304,15 @@ impl Splitting {
             return Err(error);
         }
         let account = RunAccount {
-            counters: self.tally.account().counters(),
+            counters: self.count.account().counters(),
             asked: None,
             made: None,
-            missing: lacking(None, &self.tally),
+            missing: lacking(None, &self.count),
             continues: Some(name_of(next.path())),
         };
         let last = mem::replace(current, next);
         self.closing = Some(thread::spawn(move || last.finish(&account)));
-        self.tally = self.head.tally(first_frame);
+        self.count = self.head.count(first_frame);
         (self.number, self.began_ns) = (number, current.newest_ns());
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::{Capture, Ended, StopCause};
 use nirspi_camera::account::{FailedChecks, LossCounters};
-use nirspi_camera::tally::Tally;
+use nirspi_camera::tally::FrameCount;
 use nirspi_files::causes;
 use nirspi_recon::words::count;
 
@@ -16,9 +16,9 @@ impl Capture {
         lacks(self.end(), self.counters, self.failed_checks)
     }
 
-    /// The same for the last file of several, whose frames this tally has.
-    pub(super) fn missing_in(&self, tally: &Tally) -> Option<String> {
-        lacking(self.end(), tally)
+    /// The same for the last file of several, whose frames these are.
+    pub(super) fn missing_in(&self, count: &FrameCount) -> Option<String> {
+        lacking(self.end(), count)
     }
 
     /// How the run ended, if not as requested.
@@ -81,8 +81,8 @@ impl Capture {
 }
 
 /// What a file of a run lacks, besides how the run ended.
-pub(super) fn lacking(end: Option<String>, tally: &Tally) -> Option<String> {
-    lacks(end, tally.account().counters(), tally.account().failed_checks())
+pub(super) fn lacking(end: Option<String>, count: &FrameCount) -> Option<String> {
+    lacks(end, count.account().counters(), count.account().failed_checks())
 }
 
 fn lacks(end: Option<String>, counters: LossCounters, failed: FailedChecks) -> Option<String> {

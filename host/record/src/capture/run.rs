@@ -14,7 +14,7 @@ use nirspi_camera::session::{
     ANSWER_TIMEOUT, IgnorePackets, Listener, Recorded, Request, Session, SessionError, request,
 };
 use nirspi_camera::setup::MeasurementSetup;
-use nirspi_camera::tally::Tally;
+use nirspi_camera::tally::{FrameCount, Tally};
 use nirspi_files::clock::Instant;
 use nirspi_files::provenance::Taken;
 use nirspi_wire::{
@@ -195,7 +195,8 @@ impl Run {
         observer.begins(&setup, settling.as_ref(), calibration_problem.as_ref());
         let now = Instant::now();
         let first = replayed.as_ref().map_or(0, |recorded| recorded.first_frame);
-        let tally = Tally::new(&setup, Some(number)).beginning_at(first);
+        let count = FrameCount::new(&setup, Some(number)).beginning_at(first);
+        let tally = Tally::new(&setup, count);
         let due = FramesDue::new(setup.frame_ns(), now);
         let mut run = Self {
             setup,
@@ -399,7 +400,7 @@ impl Run {
             let Capture { counters, asked, made, .. } = captured;
             let missing = captured.missing();
             let account = RunAccount { counters, asked, made, missing, continues: None };
-            let missing_in = |tally: &Tally| captured.missing_in(tally);
+            let missing_in = |count: &FrameCount| captured.missing_in(count);
             let recorded = recorder.finish(self.recorder_error, account, missing_in);
             captured.recording = recorded.files.first().cloned();
             captured.files = recorded.files;

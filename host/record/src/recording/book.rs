@@ -11,7 +11,7 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 use nirspi_camera::response::Settling;
 use nirspi_camera::setup::MeasurementSetup;
-use nirspi_camera::tally::Tally;
+use nirspi_camera::tally::FrameCount;
 use nirspi_files::identity::CameraIdentity;
 use nirspi_files::provenance::{KEY, Provenance};
 use nirspi_recon::Image;
@@ -170,7 +170,7 @@ impl<W: Write> Book<W> {
         self.message(self.wire, 0, time_ns, raw)
     }
 
-    /// Writes what the packet means for log and telemetry. `tally` has counted the packet.
+    /// Writes what the packet means for log and telemetry. `count` has counted the packet.
     ///
     /// # Errors
     /// The writer's error.
@@ -178,12 +178,12 @@ impl<W: Write> Book<W> {
         &mut self,
         time_ns: u64,
         content: &Result<DeviceMessage<'_>, PacketError>,
-        tally: &Tally,
+        count: &FrameCount,
     ) -> io::Result<()> {
         if let Some((level, text)) = self.monitor.line(content) {
             self.other(Channel::Log, time_ns, &schemas::log(time_ns, level, &text))?;
         }
-        if let Some(telemetry) = self.monitor.telemetry(time_ns, tally) {
+        if let Some(telemetry) = self.monitor.telemetry(time_ns, count) {
             self.other(Channel::Telemetry, time_ns, &telemetry.encode(time_ns))?;
         }
         Ok(())

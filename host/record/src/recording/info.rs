@@ -74,7 +74,7 @@ impl RecordingInfo {
         let widened = |span: Option<(u64, u64)>, at| {
             Some(span.map_or((at, at), |(first, last)| (first.min(at), last.max(at))))
         };
-        let tally = hear_recording(&mut recording, |heard, _| {
+        let count = hear_recording(&mut recording, |heard, _| {
             times = widened(times, heard.time_ns);
             if let Some(frame) = heard.frame() {
                 device = widened(device, frame.device_time_us);
@@ -95,8 +95,8 @@ impl RecordingInfo {
             device_seconds: seconds(device, 1e-6),
             host_seconds: seconds(times, 1e-9),
             packets: end.packets,
-            frames: tally.account().counters(),
-            failed_checks: tally.account().failed_checks(),
+            frames: count.account().counters(),
+            failed_checks: count.account().failed_checks(),
             account: end.account,
             run,
             part,

@@ -2,7 +2,7 @@
 
 use super::schemas::Telemetry;
 use nirspi_camera::events::{self, Level};
-use nirspi_camera::tally::Tally;
+use nirspi_camera::tally::FrameCount;
 use nirspi_wire::{Answer, DeviceMessage, PacketError, Reply, Status};
 
 /// Time between two records of telemetry.
@@ -30,11 +30,11 @@ impl Monitor {
     }
 
     /// The telemetry at `time_ns`, ten times a second.
-    pub(super) fn telemetry(&mut self, time_ns: u64, tally: &Tally) -> Option<Telemetry> {
+    pub(super) fn telemetry(&mut self, time_ns: u64, count: &FrameCount) -> Option<Telemetry> {
         if self.last.is_some_and(|(last, _)| time_ns.saturating_sub(last) < EVERY_NS) {
             return None;
         }
-        let counters = tally.account().counters();
+        let counters = count.account().counters();
         let frames_per_s = match self.last {
             Some((last, before)) => {
                 let seconds = (time_ns - last) as f64 * 1e-9;
@@ -44,9 +44,9 @@ impl Monitor {
         };
         self.last = Some((time_ns, counters.received));
         Some(Telemetry {
-            device_time_us: tally.device_time_us(),
+            device_time_us: count.device_time_us(),
             counters,
-            damaged_packets: tally.account().failed_checks().packets(),
+            damaged_packets: count.account().failed_checks().packets(),
             frames_per_s,
             status: self.status,
         })

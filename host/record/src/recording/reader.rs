@@ -7,7 +7,7 @@ use super::{
 };
 use nirspi_camera::response::Settling;
 use nirspi_camera::setup::MeasurementSetup;
-use nirspi_camera::tally::Tally;
+use nirspi_camera::tally::FrameCount;
 use nirspi_files::identity::CameraIdentity;
 use nirspi_files::provenance::{KEY, Provenance};
 use nirspi_wire::packet::MAX_DEVICE_PACKET;
@@ -129,10 +129,10 @@ impl Recording {
         self.part.as_ref().map_or(0, |part| part.first_frame)
     }
 
-    /// The tally of the recording before its first packet.
+    /// The count of the recording's frames before its first packet.
     #[must_use]
-    pub fn tally(&self) -> Tally {
-        Tally::new(&self.setup, self.run).beginning_at(self.first_frame())
+    pub fn frame_count(&self) -> FrameCount {
+        FrameCount::new(&self.setup, self.run).beginning_at(self.first_frame())
     }
 
     /// The information at the end of the recording. Complete after the iterator has returned its

@@ -77,26 +77,26 @@ fn copy(path: &Path, file: impl Write, out: &Path) -> Result<Recovered, RecoverE
     let (part, provenance) = (part.as_ref(), provenance.as_ref());
     let opening = Opening { identity, setup, settling, run, part, provenance };
     let mut book = Book::begin(file, &opening).map_err(write)?;
-    let mut tally = hear_recording(&mut recording, |heard, tally| {
+    let mut count = hear_recording(&mut recording, |heard, count| {
         book.packet(heard.time_ns, heard.raw)
-            .and_then(|()| book.heard(heard.time_ns, heard.content, tally))
+            .and_then(|()| book.heard(heard.time_ns, heard.content, count))
             .map_err(|error| RecoverError::from(write(error)))
     })?;
     let end = recording.end().clone();
     let old = end.account.clone().unwrap_or_default();
     if let (Some(made), false) =
-        (old.made.and_then(|made| u32::try_from(made).ok()), tally.has_ended())
+        (old.made.and_then(|made| u32::try_from(made).ok()), count.has_ended())
     {
-        tally.end(made);
+        count.end(made);
     }
-    let frames = tally.account().counters();
+    let frames = count.account().counters();
     let account = match (&end.account, &end.cut_short) {
         (Some(account), _) if account.counters == frames => account.clone(),
         (_, damage) => {
             let damage = damage.as_deref().unwrap_or("a packet is damaged");
             let before = old.missing.map_or_else(String::new, |missing| format!("; {missing}"));
             let missing = Some(format!("recovered, {damage}{before}"));
-            let made = tally.made();
+            let made = count.made();
             RunAccount {
                 counters: frames,
                 asked: old.asked,

@@ -7,7 +7,7 @@ use super::book::{Book, Opening};
 use super::file::{Place, Target};
 use super::spool::{self, Disk, Spool};
 use super::{Part, RunAccount};
-use nirspi_camera::tally::Tally;
+use nirspi_camera::tally::FrameCount;
 use nirspi_wire::{DeviceMessage, PacketError};
 use std::fs::File;
 use std::io;
@@ -117,7 +117,7 @@ impl Recorder {
         self.flush_if_due()
     }
 
-    /// Writes what the newest packet means into the channels of log and telemetry. `tally` has
+    /// Writes what the newest packet means into the channels of log and telemetry. `count` has
     /// counted the packet.
     ///
     /// # Errors
@@ -125,9 +125,9 @@ impl Recorder {
     pub fn heard(
         &mut self,
         content: &Result<DeviceMessage<'_>, PacketError>,
-        tally: &Tally,
+        count: &FrameCount,
     ) -> io::Result<()> {
-        self.book.heard(self.newest, content, tally)
+        self.book.heard(self.newest, content, count)
     }
 
     /// Hands the received packets to the disk's queue, unless the last flush is recent.
