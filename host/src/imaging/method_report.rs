@@ -25,16 +25,21 @@ impl MethodReport {
         self.made.chosen.and_then(|word| word.parse().ok()).unwrap_or(self.method)
     }
 
+    /// Whether held-back readings can say that readings are no better than chance. An even scene, as a white sheet, has nothing
+    /// to predict, and one that few patterns see nothing to predict it by.
+    pub(crate) fn can_be_judged(measurements: &Measurements) -> bool {
+        let is_even = measurements
+            .noise()
+            .is_some_and(|noise| deviation(measurements) < HeldBack::EVEN * noise);
+        !is_even && !few_patterns_see(measurements)
+    }
+
     /// A warning if held-back readings say that the readings do not belong to their patterns, with
     /// what would explain the readings. `measurements` are all that were read, in the order shown.
     #[must_use]
     pub fn doubt(&self, measurements: &Measurements) -> Option<String> {
         let held_back = self.made.held_back.filter(HeldBack::is_by_chance)?;
-        // An even scene, as a white sheet, has nothing to predict.
-        let is_even = measurements
-            .noise()
-            .is_some_and(|noise| deviation(measurements) < HeldBack::EVEN * noise);
-        if is_even || few_patterns_see(measurements) {
+        if !Self::can_be_judged(measurements) {
             return None;
         }
         let cause = match explanation(measurements) {

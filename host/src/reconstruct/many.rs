@@ -253,17 +253,18 @@ fn together(
             series.solver.solve_all(first.file, &sources, false, &|| pace.before_image())?;
         for (at, solved) in places.into_iter().zip(solved) {
             let (file, index, source) = all[at];
-            let warnings = series.verdicts.warnings(source, &solved.report);
+            let doubts = series.verdicts.doubts(source, &solved.report);
+            let warnings = source.all_warnings().into_iter().chain(doubts).collect();
             made.insert(at, file_image((file, index), source, solved, warnings));
         }
     }
     Ok(made.into_values().collect())
 }
 
-/// The doubts about measurements of files, found out once for those of the same patterns of which held-back readings confirm
-/// about the same share.
+/// The doubts about measurements, found out once for those of the same patterns of which held-back readings confirm about the
+/// same share.
 #[derive(Default)]
-struct Verdicts(Mutex<HashMap<(Rows, [bool; 2]), Vec<Verdict>>>);
+struct Verdicts(Mutex<HashMap<(Rows, [bool; 3]), Vec<Verdict>>>);
 
 /// What held-back readings say of measurements, and the doubts about them.
 type Verdict = (HeldBack, Vec<String>);
@@ -272,11 +273,12 @@ type Verdict = (HeldBack, Vec<String>);
 const ANOTHER_SHARE: f64 = 0.05;
 
 impl Verdicts {
-    /// What a user must know of an image.
-    fn warnings(&self, source: &Source, report: &MethodReport) -> Vec<String> {
-        let Some(found) = report.made.held_back else { return all_warnings(source, report) };
+    /// Whether the readings belong to their patterns.
+    fn doubts(&self, source: &Source, report: &MethodReport) -> Vec<String> {
+        let Some(found) = report.made.held_back else { return Vec::new() };
         // What is doubted also depends on these.
-        let of_source = [source.warnings.is_empty(), source.frames.is_some()];
+        let can_be_judged = MethodReport::can_be_judged(&source.measurements);
+        let of_source = [source.warnings.is_empty(), source.frames.is_some(), can_be_judged];
         let of = (source.measurements.rows().clone(), of_source);
         let is_alike = |(one, _): &&Verdict| {
             one.is_by_chance() == found.is_by_chance()
@@ -290,7 +292,7 @@ impl Verdicts {
             all().entry(of).or_default().push(verdict.clone());
             verdict
         });
-        source.all_warnings().into_iter().chain(doubts).collect()
+        doubts
     }
 }
 
@@ -308,20 +310,21 @@ pub(super) struct Part {
 pub(super) fn file_images(
     file: &Path,
     sources: &[Source],
-    solver: &Solver,
+    series: &Series<'_>,
     part: Part,
     is_video: bool,
     going_on: GoingOn<'_>,
 ) -> Result<Vec<FileImage>, SolverError> {
-    let made = solver.solve_all(file, sources, is_video, going_on)?;
+    let made = series.solver.solve_all(file, sources, is_video, going_on)?;
     let all = sources.iter().zip(made).enumerate();
     let image = |(at, (source, solved)): (usize, (&Source, Solved))| {
         let index = part.from + at;
-        // The frames of one recording lack the same, and are judged together.
-        let warnings = match index {
-            0 => all_warnings(source, &solved.report),
+        // The frames of one recording lack the same.
+        let mut warnings = match index {
+            0 => source.all_warnings(),
             _ => source.warnings.clone(),
         };
+        warnings.extend(series.verdicts.doubts(source, &solved.report));
         file_image((file, part.several.then_some(index)), source, solved, warnings)
     };
     Ok(all.map(image).collect())
@@ -354,15 +357,8 @@ fn file_image(
     }
 }
 
-/// What a user must know of an image: of its readings, and whether they belong to their patterns.
-pub(super) fn all_warnings(source: &Source, report: &MethodReport) -> Vec<String> {
-    let mut warnings = source.all_warnings();
-    warnings.extend(doubts(source, report));
-    warnings
-}
-
 /// Whether the readings belong to their patterns.
-fn doubts(source: &Source, report: &MethodReport) -> Vec<String> {
+pub(super) fn doubts(source: &Source, report: &MethodReport) -> Vec<String> {
     // A named form of the readings says more.
     let doubt = source.warnings.is_empty().then(|| report.doubt(&source.measurements)).flatten();
     // A recording of our own camera numbers its readings.
@@ -507,7 +503,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stack_whose_readings_belong_to_other_patterns_is_doubted_once() {
+    fn each_image_of_a_stack_whose_readings_belong_to_other_patterns_is_doubted() {
         let folder = tempfile::tempdir().unwrap();
         let solver = solver_of(Method::TIKHONOV);
         let doubts = |value: fn(usize) -> f64| -> Vec<usize> {
@@ -518,14 +514,16 @@ mod tests {
             let read = || Source::read(&path, &SourceOptions::default()).unwrap();
             let sources: Vec<Source> = (0..10).map(|_| read()).collect();
             let all = Part { from: 0, several: true };
-            let images = file_images(&path, &sources, &solver, all, false, &|| Ok(())).unwrap();
+            let images = file_images(&path, &sources, &Series::of(&solver), all, false, &|| Ok(()));
             let is_doubt = |warning: &&String| warning.contains("no better than chance");
-            images.iter().map(|image| image.warnings.iter().filter(is_doubt).count()).collect()
+            images
+                .unwrap()
+                .iter()
+                .map(|image| image.warnings.iter().filter(is_doubt).count())
+                .collect()
         };
         // Readings of no scene, and those of a bright corner.
-        let mut once = vec![0; 10];
-        once[0] = 1;
-        assert_eq!(doubts(|row| ((row * 7919 + 13) % 101) as f64 - 50.0), once);
+        assert_eq!(doubts(|row| ((row * 7919 + 13) % 101) as f64 - 50.0), vec![1; 10]);
         assert_eq!(doubts(|row| if row & 0x88 == 0 { 64.0 } else { 0.0 }), vec![0; 10]);
     }
 }

@@ -1,6 +1,6 @@
 //! One image, its pictures and its report, in a folder.
 
-use super::many::all_warnings;
+use super::many::doubts;
 use super::{Networks, PipelineError, ResultFolder, Solved, Solver, not_read_words};
 use crate::account::LossCounters;
 use crate::files::output::OutputDir;
@@ -178,7 +178,8 @@ pub(super) fn one_image(
         }
         None => (None, None),
     };
-    let warnings = all_warnings(&source, &method);
+    let mut warnings = source.all_warnings();
+    warnings.extend(doubts(&source, &method));
     let unit = Unit::of_readings(source.frames.is_some());
     let short = enhancement.as_ref().map(|enhancement| enhancement.short.clone());
     let dropouts = source.dropouts.into_iter().map(|d| DropoutReport {

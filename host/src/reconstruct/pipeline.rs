@@ -96,13 +96,13 @@ impl Pipeline {
             true => sources.fit_together().map(|()| usize::MAX)?,
             false => AT_A_TIME,
         };
-        let (several, mut from) = (sources.len() > 1, 0);
+        let (series, several, mut from) = (Series::of(&self.solver), sources.len() > 1, 0);
         let mut batches = sources.batches(most)?;
         let (writing, ended) = self.writing_beside(folder, &mut times, |times| {
             let batch = times.time("read", || batches.next())?;
             let part = Part { from, several };
             let images = batch.map_err(PipelineError::from).and_then(|batch| {
-                times.time("reconstruct", || self.batch(&batch, part, folder, watch))
+                times.time("reconstruct", || of_batch(&batch, &series, part, folder, watch))
             });
             from += images.as_ref().map_or(0, Vec::len);
             Some(images)
@@ -203,24 +203,23 @@ impl Pipeline {
             (writing, failed.or(ended))
         })
     }
+}
 
-    /// The images of some measurements of a file.
-    fn batch(
-        &self,
-        batch: &[Source],
-        part: Part,
-        folder: &ResultFolder<'_>,
-        watch: Watch<'_>,
-    ) -> Result<Vec<FileImage>, PipelineError> {
-        let going_on = || match watch(Step::Reconstruct) {
-            true => Ok(()),
-            false => Err(ReconstructError::Stopped),
-        };
-        let (file, is_video) = (folder.input, folder.warm_start);
-        let made = file_images(file, batch, &self.solver, part, is_video, &going_on);
-        made.map_err(|error| match error {
-            SolverError::Method(ReconstructError::Stopped) => PipelineError::Stopped,
-            error => error.into(),
-        })
-    }
+/// The images of some measurements of a file.
+fn of_batch(
+    batch: &[Source],
+    series: &Series<'_>,
+    part: Part,
+    folder: &ResultFolder<'_>,
+    watch: Watch<'_>,
+) -> Result<Vec<FileImage>, PipelineError> {
+    let going_on = || match watch(Step::Reconstruct) {
+        true => Ok(()),
+        false => Err(ReconstructError::Stopped),
+    };
+    let made = file_images(folder.input, batch, series, part, folder.warm_start, &going_on);
+    made.map_err(|error| match error {
+        SolverError::Method(ReconstructError::Stopped) => PipelineError::Stopped,
+        error => error.into(),
+    })
 }
