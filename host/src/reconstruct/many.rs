@@ -264,7 +264,10 @@ fn together(
 /// The doubts about measurements, found out once for those of the same patterns of which held-back readings confirm about the
 /// same share.
 #[derive(Default)]
-struct Verdicts(Mutex<HashMap<(Rows, [bool; 3]), Vec<Verdict>>>);
+struct Verdicts(Mutex<HashMap<Doubted, Vec<Verdict>>>);
+
+/// The patterns, and what else the doubts depend on.
+type Doubted = (Rows, [bool; 3]);
 
 /// What held-back readings say of measurements, and the doubts about them.
 type Verdict = (HeldBack, Vec<String>);
@@ -276,7 +279,6 @@ impl Verdicts {
     /// Whether the readings belong to their patterns.
     fn doubts(&self, source: &Source, report: &MethodReport) -> Vec<String> {
         let Some(found) = report.made.held_back else { return Vec::new() };
-        // What is doubted also depends on these.
         let can_be_judged = MethodReport::can_be_judged(&source.measurements);
         let of_source = [source.warnings.is_empty(), source.frames.is_some(), can_be_judged];
         let of = (source.measurements.rows().clone(), of_source);
