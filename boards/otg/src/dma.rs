@@ -1,4 +1,4 @@
-//! The core's own DMA (feature `dma`, [`Config::dma`]). Not in the release.
+//! The core's own DMA ([`Config::dma`]). Not in the release.
 //!
 //! With DMA every endpoint goes by DMA, the control endpoint too, and the processor touches neither FIFOs nor `GRXSTSP`.
 //! Sources: ST RM0456 (OTG_HS, "DMA mode"), ST's HAL, and the drivers of TinyUSB and Zephyr, which name what a core from
@@ -15,7 +15,7 @@ use core::task::Poll;
 
 use embassy_usb_driver::{Direction, EndpointError, EndpointType};
 
-use crate::otg_v1::{Otg, regs};
+use crate::otg_v1::{Otg, RW, Reg, regs};
 use crate::{Config, EP_OUT_BUFFER_EMPTY, EpState, State, repair};
 
 /// Largest packet of the control endpoint, and the room for what comes to it: a packet, or up to three requests.
@@ -31,6 +31,10 @@ const STATUS_PHASE: u32 = 1 << 5;
 const IS_REQUEST: u32 = 1 << 15;
 /// `GINTSTS`: no OUT endpoint takes anything any more.
 const GLOBAL_OUT_NAK: u32 = 1 << 7;
+
+/// Where `DIEPDMA` of endpoint 0 lies, and from there that of each next endpoint.
+const DIEPDMA: usize = 0x914;
+const DIEPDMA_STEP: usize = 0x20;
 
 /// Words at the end of the FIFO memory in which the DMA keeps its addresses, for each endpoint number: 1024 words less
 /// the `GHWCFG3.DFIFODEPTH` of 952 that TinyUSB has read from an STM32U5A5, with nine endpoint numbers.
@@ -79,9 +83,9 @@ pub(crate) fn reserved_words(config: &Config, endpoint_count: usize) -> u16 {
 
 /// The address at which the core finds this memory for as long as the driver lives.
 fn address_of<T>(memory: *const T, _bytes: usize) -> u32 {
-    #[cfg(feature = "simulated")]
+    #[cfg(not(target_os = "none"))]
     return crate::simulated::lend(memory.cast(), _bytes, true);
-    #[cfg(not(feature = "simulated"))]
+    #[cfg(target_os = "none")]
     return memory.addr() as u32;
 }
 
@@ -197,13 +201,20 @@ async fn until_sent(r: Otg, index: usize, ep: &EpState) -> Result<(), EndpointEr
     .await
 }
 
+/// `DIEPDMA`, where the core reads the transfer of an IN endpoint. The crate of the registers lacks it.
+fn diepdma(r: Otg, index: usize) -> Reg<u32, RW> {
+    let address = r.as_ptr().wrapping_byte_add(DIEPDMA + DIEPDMA_STEP * index);
+    // SAFETY: the register of an endpoint that the driver has.
+    unsafe { Reg::from_ptr(address.cast()) }
+}
+
 fn arm_in(r: Otg, index: usize, packets: u16, address: u32, bytes: usize) {
     critical_section::with(|_| {
         r.dieptsiz(index).write(|w| {
             w.set_pktcnt(packets);
             w.set_xfrsiz(bytes as _);
         });
-        r.diepdma(index).write_value(address);
+        diepdma(r, index).write_value(address);
         // What the core reads was written before.
         fence(Ordering::SeqCst);
         r.diepctl(index).modify(|w| {
@@ -218,22 +229,22 @@ struct Armed<'b> {
     r: Otg,
     index: usize,
     _bytes: &'b [u8],
-    #[cfg(feature = "simulated")]
+    #[cfg(not(target_os = "none"))]
     address: u32,
 }
 
 impl<'b> Armed<'b> {
     fn new(r: Otg, index: usize, packets: u16, bytes: &'b [u8]) -> Self {
-        #[cfg(feature = "simulated")]
+        #[cfg(not(target_os = "none"))]
         let address = crate::simulated::lend(bytes.as_ptr(), bytes.len(), false);
-        #[cfg(not(feature = "simulated"))]
+        #[cfg(target_os = "none")]
         let address = bytes.as_ptr().addr() as u32;
         arm_in(r, index, packets, address, bytes.len());
         Self {
             r,
             index,
             _bytes: bytes,
-            #[cfg(feature = "simulated")]
+            #[cfg(not(target_os = "none"))]
             address,
         }
     }
@@ -244,7 +255,7 @@ impl Drop for Armed<'_> {
         if self.r.diepctl(self.index).read().epena() {
             repair::disarm_in(self.r, self.index);
         }
-        #[cfg(feature = "simulated")]
+        #[cfg(not(target_os = "none"))]
         crate::simulated::take_back(self.address);
     }
 }

@@ -1,4 +1,4 @@
-#![cfg_attr(not(any(test, feature = "simulated")), no_std)]
+#![cfg_attr(target_os = "none", no_std)]
 // A fork of release 0.3.3: README.md names the differences, and this file is otherwise as released.
 #![allow(clippy::all, reason = "upstream's code, which is kept as it is")]
 #![allow(async_fn_in_trait)]
@@ -21,17 +21,19 @@ use embassy_usb_driver::{
     EndpointType, Event, Unsupported,
 };
 
-use crate::fmt::Bytes;
+use crate::fmt::{Bytes, assert, assert_eq, error, panic, trace};
 
-pub mod otg_v1;
-
-#[cfg(feature = "dma")]
 mod dma;
 mod repair;
-#[cfg(feature = "simulated")]
+#[cfg(not(target_os = "none"))]
 pub mod simulated;
-#[cfg(feature = "simulated")]
+#[cfg(not(target_os = "none"))]
 pub mod testing;
+
+#[cfg(target_os = "none")]
+pub use registers::otg_v1;
+#[cfg(not(target_os = "none"))]
+pub use simulated::otg_v1;
 
 use otg_v1::{Otg, regs, vals};
 
@@ -39,7 +41,6 @@ use otg_v1::{Otg, regs, vals};
 pub unsafe fn on_interrupt<const MAX_EP_COUNT: usize>(r: Otg, state: &State<MAX_EP_COUNT>, ep_count: usize) {
     trace!("irq");
 
-    #[cfg(feature = "dma")]
     if state.dma.is_on() {
         return dma::on_interrupt(r, state);
     }
@@ -315,7 +316,6 @@ pub struct State<const EP_COUNT: usize> {
     cp_state: ControlPipeSetupState,
     ep_states: [EpState; EP_COUNT],
     bus_waker: AtomicWaker,
-    #[cfg(feature = "dma")]
     dma: dma::Dma,
 }
 
@@ -340,7 +340,6 @@ impl<const EP_COUNT: usize> State<EP_COUNT> {
                 }
             }; EP_COUNT],
             bus_waker: AtomicWaker::new(),
-            #[cfg(feature = "dma")]
             dma: dma::Dma::new(),
         }
     }
@@ -383,18 +382,7 @@ pub struct Config {
 
     /// The core reads and writes memory by its own DMA, and the processor copies nothing. For chips whose core has DMA
     /// and whose memory needs no cleaning of a data cache. [`Endpoint::uses_dma`] states what `write` then asks for.
-    #[cfg(feature = "dma")]
     pub dma: bool,
-}
-
-impl Config {
-    #[inline(always)]
-    fn uses_dma(&self) -> bool {
-        #[cfg(feature = "dma")]
-        return self.dma;
-        #[cfg(not(feature = "dma"))]
-        false
-    }
 }
 
 impl Default for Config {
@@ -402,7 +390,6 @@ impl Default for Config {
         Self {
             vbus_detection: false,
             xcvrdly: false,
-            #[cfg(feature = "dma")]
             dma: false,
         }
     }
@@ -429,7 +416,6 @@ impl<'d, const MAX_EP_COUNT: usize> Driver<'d, MAX_EP_COUNT> {
     /// * `instance` - The USB OTG peripheral instance and its configuration.
     /// * `config` - The USB driver configuration.
     pub fn new(ep_out_buffer: &'d mut [u8], instance: OtgInstance<'d, MAX_EP_COUNT>, config: Config) -> Self {
-        #[cfg(feature = "dma")]
         instance.state.dma.turn(config.dma);
         Self {
             config,
@@ -469,7 +455,6 @@ impl<'d, const MAX_EP_COUNT: usize> Driver<'d, MAX_EP_COUNT> {
             }
         };
 
-        #[cfg(feature = "dma")]
         if self.config.dma && !dma::can_serve(ep_type, &self.ep_out_buffer[self.ep_out_buffer_offset..]) {
             error!("DMA serves no isochronous endpoint, and no buffer that is not at a multiple of 4 bytes");
             return Err(EndpointAllocError);
@@ -480,12 +465,8 @@ impl<'d, const MAX_EP_COUNT: usize> Driver<'d, MAX_EP_COUNT> {
             // INEPTXFD requires minimum size of 16 words
             Direction::In => u16::max((max_packet_size + 3) / 4, 16),
         };
-        #[cfg(feature = "dma")]
         let fifo_size_words = dma::fifo_words(&self.config, D::dir(), ep_type, fifo_size_words);
-        #[cfg(feature = "dma")]
         let reserved_words = dma::reserved_words(&self.config, self.instance.endpoint_count);
-        #[cfg(not(feature = "dma"))]
-        let reserved_words = 0;
 
         if fifo_size_words + self.allocated_fifo_words() + reserved_words > self.instance.fifo_depth_words {
             error!("Not enough FIFO capacity");
@@ -559,7 +540,6 @@ impl<'d, const MAX_EP_COUNT: usize> Driver<'d, MAX_EP_COUNT> {
                 max_packet_size,
                 interval_ms,
             },
-            #[cfg(feature = "dma")]
             dma: self.config.dma.then_some(&self.instance.state.dma),
         })
     }
@@ -642,7 +622,7 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
             w.set_wuim(true);
             w.set_iepint(true);
             w.set_oepint(true);
-            w.set_rxflvlm(!self.config.uses_dma());
+            w.set_rxflvlm(!self.config.dma);
             w.set_srqim(true);
             w.set_otgint(true);
         });
@@ -820,7 +800,6 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
         // Unmask SETUP received EP interrupt
         r.doepmsk().write(|w| {
             w.set_stupm(true);
-            #[cfg(feature = "dma")]
             if self.config.dma {
                 dma::unmask_out(w);
             }
@@ -833,7 +812,6 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
         // Unmask global interrupt
         r.gahbcfg().write(|w| {
             w.set_gint(true); // unmask global interrupt
-            #[cfg(feature = "dma")]
             if self.config.dma {
                 dma::enable(w);
             }
@@ -936,7 +914,6 @@ impl<'d, const MAX_EP_COUNT: usize> Bus<'d, MAX_EP_COUNT> {
                         }
                     });
 
-                    #[cfg(feature = "dma")]
                     if self.config.dma {
                         if index == 0 {
                             self.instance.state.dma.listen(regs);
@@ -1036,7 +1013,6 @@ impl<'d, const MAX_EP_COUNT: usize> embassy_usb_driver::Bus for Bus<'d, MAX_EP_C
                         }
                     }
                 }
-                #[cfg(feature = "dma")]
                 if self.config.dma {
                     (1..self.instance.endpoint_count).for_each(|index| dma::disarm_out(regs, index));
                 }
@@ -1118,7 +1094,7 @@ impl<'d, const MAX_EP_COUNT: usize> embassy_usb_driver::Bus for Bus<'d, MAX_EP_C
                 critical_section::with(|_| {
                     regs.doepctl(ep_addr.index()).modify(|w| {
                         w.set_stall(stalled);
-                        if self.config.uses_dma() {
+                        if self.config.dma {
                             // A written 0 leaves EPENA, which the core may have cleared since it was read.
                             w.set_epena(false);
                         }
@@ -1171,7 +1147,6 @@ impl<'d, const MAX_EP_COUNT: usize> embassy_usb_driver::Bus for Bus<'d, MAX_EP_C
         let regs = self.instance.regs;
         let state = self.instance.state;
         match ep_addr.direction() {
-            #[cfg(feature = "dma")]
             Direction::Out if self.config.dma => {
                 let index = ep_addr.index();
                 let ep = self.ep_out[index].as_ref().map(|ep| ep.ep_type);
@@ -1329,7 +1304,6 @@ pub struct Endpoint<'d, D> {
     regs: Otg,
     info: EndpointInfo,
     state: &'d EpState,
-    #[cfg(feature = "dma")]
     dma: Option<&'d dma::Dma>,
 }
 
@@ -1379,7 +1353,6 @@ impl<'d> embassy_usb_driver::EndpointOut for Endpoint<'d, Out> {
     async fn read(&mut self, buf: &mut [u8]) -> Result<usize, EndpointError> {
         trace!("read start len={}", buf.len());
 
-        #[cfg(feature = "dma")]
         if self.dma.is_some() {
             return dma::read(self.regs, self.info.addr.index(), self.state, buf).await;
         }
@@ -1459,10 +1432,7 @@ impl<'d> Endpoint<'d, In> {
     /// up to 1023 packets at once, which begin at a multiple of four bytes in memory that the core reaches, and waits
     /// until the host has fetched them all. A `write` that is dropped before takes back what the host has not fetched.
     pub fn uses_dma(&self) -> bool {
-        #[cfg(feature = "dma")]
-        return self.dma.is_some();
-        #[cfg(not(feature = "dma"))]
-        false
+        self.dma.is_some()
     }
 }
 
@@ -1470,7 +1440,6 @@ impl<'d> embassy_usb_driver::EndpointIn for Endpoint<'d, In> {
     async fn write(&mut self, buf: &[u8]) -> Result<(), EndpointError> {
         trace!("write ep={:?} data={:?}", self.info.addr, Bytes(buf));
 
-        #[cfg(feature = "dma")]
         if let Some(dma) = self.dma {
             return dma.write(self.regs, self.info.addr.index(), self.state, buf).await;
         }
@@ -1632,7 +1601,6 @@ impl<'d> embassy_usb_driver::ControlPipe for ControlPipe<'d> {
                     self.ep_out.state.out_size.store(EP_OUT_BUFFER_EMPTY, Ordering::Release);
                 }
 
-                #[cfg(feature = "dma")]
                 if self.ep_out.dma.is_some() {
                     dma::expect_data(self.regs, &data);
                     return Poll::Ready(data);
@@ -1698,7 +1666,6 @@ impl<'d> embassy_usb_driver::ControlPipe for ControlPipe<'d> {
         });
         self.regs.doepctl(self.ep_out.info.addr.index()).modify(|w| {
             w.set_stall(true);
-            #[cfg(feature = "dma")]
             if self.ep_out.dma.is_some() {
                 // As in `endpoint_set_stalled`.
                 w.set_epena(false);

@@ -6,15 +6,16 @@ use core::task::Poll;
 
 use embassy_usb_driver::{EndpointError, EndpointType};
 
+use crate::fmt::error;
 use crate::otg_v1::{Otg, vals};
 use crate::{ControlPipeSetupState, EP_OUT_BUFFER_EMPTY, EndpointData, State};
 
 /// Whether the repairs are in force: always, except in a test that shows what the release does.
 #[inline(always)]
 pub(crate) fn in_force() -> bool {
-    #[cfg(feature = "simulated")]
+    #[cfg(not(target_os = "none"))]
     return !crate::simulated::as_released();
-    #[cfg(not(feature = "simulated"))]
+    #[cfg(target_os = "none")]
     true
 }
 
@@ -44,7 +45,6 @@ pub(crate) fn disarm_in(r: Otg, index: usize) {
             r.diepint(index).write(|w| w.set_epdisd(true));
         }
         // A FIFO is not emptied while the core's DMA may still write to it.
-        #[cfg(feature = "dma")]
         wait(|| r.grstctl().read().ahbidl());
         r.grstctl().write(|w| {
             w.set_txfflsh(true);

@@ -1,11 +1,12 @@
 //! A core without silicon, for tests on the host. Not in the release.
 //!
-//! With the feature `simulated`, each access of the driver to a register goes to the [`Core`] of the thread.
+//! On a target with an operating system, each access of the driver to a register goes to the [`Core`] of the thread.
 
 use core::cell::{Cell, RefCell};
 use std::rc::Rc;
-#[cfg(feature = "dma")]
 use std::vec::Vec;
+
+pub mod otg_v1;
 
 /// Registers that behave as those of the OTG core.
 pub trait Core {
@@ -21,7 +22,6 @@ const SPACE_BYTES: usize = 0x2_0000;
 static SPACE: [u8; SPACE_BYTES] = [0; SPACE_BYTES];
 
 /// Memory that the driver has lent to the core's DMA.
-#[cfg(feature = "dma")]
 struct Loan {
     /// Where the core finds this memory.
     address: u32,
@@ -31,10 +31,8 @@ struct Loan {
 }
 
 /// Where the memory begins that the core finds.
-#[cfg(feature = "dma")]
 const MEMORY: u32 = 0x2000_0000;
 
-#[cfg(feature = "dma")]
 std::thread_local! {
     static LOANS: RefCell<Vec<Loan>> = const { RefCell::new(Vec::new()) };
     static FREE: Cell<u32> = const { Cell::new(MEMORY) };
@@ -42,7 +40,6 @@ std::thread_local! {
 
 /// Lends memory to the core until it is taken back, and returns its address, as far from a multiple of 4 as the memory.
 /// Memory that the core may write is lent once and for all.
-#[cfg(feature = "dma")]
 pub(crate) fn lend(memory: *const u8, bytes: usize, is_writable: bool) -> u32 {
     LOANS.with_borrow_mut(|loans| {
         let again = loans
@@ -64,12 +61,10 @@ pub(crate) fn lend(memory: *const u8, bytes: usize, is_writable: bool) -> u32 {
 }
 
 /// The core must no longer read what was lent at this address.
-#[cfg(feature = "dma")]
 pub(crate) fn take_back(address: u32) {
     LOANS.with_borrow_mut(|loans| loans.retain(|loan| loan.address != address));
 }
 
-#[cfg(feature = "dma")]
 fn with_memory<R>(address: u32, bytes: usize, writes: bool, access: impl FnOnce(*mut u8) -> R) -> Option<R> {
     LOANS.with_borrow(|loans| {
         let place = |loan: &&Loan| {
@@ -83,7 +78,6 @@ fn with_memory<R>(address: u32, bytes: usize, writes: bool, access: impl FnOnce(
 }
 
 /// What the core's DMA reads at this address. `None`: the driver has not lent that memory, or has taken it back.
-#[cfg(feature = "dma")]
 pub fn fetch(address: u32, bytes: usize) -> Option<Vec<u8>> {
     with_memory(address, bytes, false, |memory| {
         // SAFETY: the driver says that this memory may be read, and runs on this thread only.
@@ -92,7 +86,6 @@ pub fn fetch(address: u32, bytes: usize) -> Option<Vec<u8>> {
 }
 
 /// The core's DMA writes to this address. False: the driver has lent no such memory for that.
-#[cfg(feature = "dma")]
 pub fn store(address: u32, bytes: &[u8]) -> bool {
     let write = |memory: *mut u8| {
         // SAFETY: the driver says that this memory may be written, and runs on this thread only.

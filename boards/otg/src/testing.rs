@@ -9,7 +9,7 @@ use crate::simulated::{Core, place};
 
 /// Makes this core the one of the thread. With `as_released`, the driver runs without the fork's repairs.
 pub fn install(core: Rc<RefCell<dyn Core>>, as_released: bool) -> Otg {
-    // SAFETY: with this feature the registers are addresses that are never accessed.
+    // SAFETY: on a host the registers are addresses that are never accessed.
     unsafe { Otg::from_ptr(place(core, as_released).cast()) }
 }
 
