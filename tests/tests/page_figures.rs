@@ -119,7 +119,7 @@ fn sizes_and_times_of_recordings_and_feeds_are_those_of_the_code() {
 #[test]
 fn sizes_of_figures_are_those_of_the_code() {
     let page = "docs/results.md";
-    let look = "host/src/picture/look.rs";
+    let look = "host/picture/src/look.rs";
     let of = |style: &str| numbers(look, &format!("Self::{style} => light("), ")");
     let (paper, column, slide) = (of("Paper"), of("Column"), of("Slide"));
     says(
@@ -140,13 +140,13 @@ fn sizes_of_figures_are_those_of_the_code() {
         "| `screen` | dark | {} pixels | {} points | {} dpi |",
         &[pixels, screen[2], screen[3]],
     );
-    let percentiles = numbers("host/src/picture/scale.rs", "PERCENTILES: [f64; 2] = [", "]");
+    let percentiles = numbers("host/picture/src/scale.rs", "PERCENTILES: [f64; 2] = [", "]");
     says(page, "The percentiles {} and {} of the image's pixels", &percentiles);
-    let sheet = |name: &str| constant("host/src/picture/sheet.rs", name);
+    let sheet = |name: &str| constant("host/picture/src/sheet.rs", name);
     says(page, "Of more than {} images, the sheet shows {}, evenly chosen", &[sheet("MOST"); 2]);
     let (rate, most) = (
-        constant("host/src/picture/video.rs", "RATE_HZ"),
-        constant("host/src/picture/video.rs", "MOST"),
+        constant("host/picture/src/video.rs", "RATE_HZ"),
+        constant("host/picture/src/video.rs", "MOST"),
     );
     says(page, "a video of {} frames a second", &[rate]);
     says(page, "of up to {} frames, evenly chosen", &[sheet("MOST_BESIDE")]);

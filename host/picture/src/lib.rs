@@ -1,5 +1,5 @@
-//! Pictures for users: figures of images side by side with titles, axes in millimetres, grey bars
-//! and a note of the source; contact sheets and videos of many images; charts.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+#![doc = include_str!("../README.md")]
 //!
 //! A [`Figure`] is what is shown. A [`FigureStyle`] is what it is made for: paper by default, with a
 //! white ground and text of 8 points. A [`Drawing`] is the figure laid out, and is written as PNG,
@@ -13,12 +13,11 @@
 //! (`sheet::tests::text_of_any_length_stays_inside_the_sheet`). Fonts and libraries are part of the
 //! program, not of the system.
 
-pub(crate) mod glyph;
-
 mod bar;
 mod chart;
 mod drawing;
 mod figure;
+mod glyph;
 mod layout;
 mod look;
 mod pdf;
@@ -51,5 +50,7 @@ pub use video::of_images as video;
 
 #[cfg(test)]
 mod checks;
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;

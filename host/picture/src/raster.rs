@@ -7,8 +7,8 @@
 use super::drawing::{Drawing, Shape};
 use super::look::Colour;
 use super::text::{Font, height_of, placed_glyphs};
-use crate::files::image::{Canvas, Filter, resample};
 use ab_glyph::{Font as _, ScaleFont as _, point};
+use nirspi_files::image::{Canvas, Filter, resample};
 
 impl Drawing {
     /// The drawing as an image.

@@ -3,10 +3,10 @@
 use super::drawing::{Drawing, Shape, enlarged};
 use super::look::Colour;
 use super::text::{Font, placed_glyphs};
-use crate::provenance::Provenance;
 use ab_glyph::{Font as _, FontRef, GlyphId};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
+use nirspi_files::provenance::Provenance;
 use pdf_writer::types::{CidFontType, FontFlags, LineJoinStyle, SystemInfo, UnicodeCmap};
 use pdf_writer::{Content, Filter, Finish, Name, Pdf, Rect, Ref, Str, TextStr};
 use std::collections::BTreeMap;

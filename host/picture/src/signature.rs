@@ -3,7 +3,7 @@
 use super::drawing::Drawing;
 use super::look::Look;
 use super::text::{Block, Style};
-use crate::provenance::Provenance;
+use nirspi_files::provenance::Provenance;
 
 /// The drawing with its provenance in words below it.
 pub(super) fn signed(drawing: Drawing, look: &Look, provenance: &Provenance) -> Drawing {
@@ -24,8 +24,8 @@ pub(super) const MARGIN: u32 = 10;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::{Axis, Chart, Figure, FigureStyle};
     use crate::testing::provenance;
+    use crate::{Axis, Chart, Figure, FigureStyle};
 
     #[test]
     fn a_picture_stays_as_it_is_above_its_line_of_provenance() {

@@ -5,7 +5,7 @@
 //! (`tests::the_three_files_of_a_figure_have_the_same_texts_and_images`).
 
 use super::look::{Colour, Look};
-use crate::provenance::Provenance;
+use nirspi_files::provenance::Provenance;
 
 /// One thing that is drawn. Lengths are pixels of the PNG, from the upper left corner.
 #[derive(Debug, Clone, PartialEq)]

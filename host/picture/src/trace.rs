@@ -1,7 +1,7 @@
 //! The beginning of a trace: its samples, the trigger's edges, and the samples that make each reading.
 
 use super::{Axis, Chart, Line};
-use crate::files::trace::Found;
+use nirspi_files::trace::Found;
 
 /// A point that a line leaves out, so that the next piece of the line is apart.
 const APART: (f64, f64) = (f64::NAN, f64::NAN);
@@ -45,8 +45,8 @@ pub fn of_trace(found: &Found, footer: String) -> Chart {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::trace::First;
-    use crate::provenance::Taken;
+    use nirspi_files::provenance::Taken;
+    use nirspi_files::trace::First;
 
     #[test]
     fn readings_and_edges_stand_where_they_were_found() {

@@ -16,7 +16,7 @@ use super::scale::{PERCENTILES, Range, Scale, Unit};
 use super::signature::MARGIN;
 use super::text::{Block, Style};
 use super::ticks::{between, label};
-use crate::files::image::{Placed, to_level};
+use nirspi_files::image::{Placed, to_level};
 use nirspi_recon::Image;
 
 /// Blank between panels, in sixteenths of the text's size.

@@ -1,7 +1,7 @@
 use super::super::drawing::Shape;
 use super::*;
-use crate::picture::{Axis, Panel, Unit};
 use crate::testing::provenance;
+use crate::{Axis, Panel, Unit};
 
 fn chart(header: &str, points: &[(f64, f64)]) -> Chart {
     let line = |name: &str, colour| Line {

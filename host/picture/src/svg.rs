@@ -3,8 +3,8 @@
 use super::drawing::{Drawing, Shape, enlarged};
 use super::look::Colour;
 use super::text;
-use crate::provenance::Provenance;
 use data_encoding::BASE64;
+use nirspi_files::provenance::Provenance;
 use std::fmt::Write;
 
 impl Drawing {

@@ -1,5 +1,5 @@
 use super::*;
-use crate::picture::{Figure, FigureStyle};
+use crate::{Figure, FigureStyle};
 use proptest::prelude::*;
 
 fn look() -> Look {

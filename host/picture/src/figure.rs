@@ -11,10 +11,10 @@ use super::drawing::Drawing;
 use super::layout::SideBySide;
 use super::look::{FigureStyle, Look};
 use super::signature::signed;
-use crate::files::FileError;
-use crate::files::image::{encode_labelled, encode_rgb};
-use crate::files::output::{Existing, OutputDir, write_result};
-use crate::provenance::Provenance;
+use nirspi_files::FileError;
+use nirspi_files::image::{encode_labelled, encode_rgb};
+use nirspi_files::output::{Existing, OutputDir, write_result};
+use nirspi_files::provenance::Provenance;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

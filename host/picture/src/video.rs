@@ -10,8 +10,8 @@ use super::look::{FigureStyle, Look};
 use super::scale::{Range, Unit};
 use super::sheet::{MOST_BESIDE, Sheet, evenly};
 use super::signature::signed;
-use crate::files::image::{Canvas, sign};
-use crate::provenance::Provenance;
+use nirspi_files::image::{Canvas, sign};
+use nirspi_files::provenance::Provenance;
 use nirspi_recon::{Image, Shape};
 use rayon::prelude::*;
 

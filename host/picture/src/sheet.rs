@@ -12,8 +12,8 @@ use super::scale::{Range, Scale, Unit};
 use super::signature::{MARGIN, signed};
 use super::text::{Block, Style};
 use super::ticks::number;
-use crate::files::image::{encode_labelled, to_level};
-use crate::provenance::Provenance;
+use nirspi_files::image::{encode_labelled, to_level};
+use nirspi_files::provenance::Provenance;
 use rayon::prelude::*;
 
 /// The least edge of an image in the picture, in sixteenths of the text's size: its label stays

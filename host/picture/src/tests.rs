@@ -1,7 +1,7 @@
 use super::*;
-use crate::files::FileError;
-use crate::files::image::{Reflectance, read_reflectance};
 use crate::testing::provenance;
+use nirspi_files::FileError;
+use nirspi_files::image::{Reflectance, read_reflectance};
 
 fn read(bytes: &[u8]) -> Result<Reflectance, FileError> {
     let folder = tempfile::tempdir().unwrap();
