@@ -3,9 +3,9 @@
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
-//! `nirspi-files`, `nirspi-camera`, `nirspi-record` and `nirspi-picture` are here under one name: [`files`]
-//! with [`provenance`]; [`session`] and all that a camera says; [`capture`], [`recording`] and [`replay`];
-//! `picture`. Their front pages list their modules. This crate adds, each line using only the lines above
+//! `nirspi-files`, `nirspi-feed`, `nirspi-camera`, `nirspi-record` and `nirspi-picture` are here under one
+//! name: [`files`] with [`provenance`]; `feed`; [`session`] and all that a camera says; [`capture`],
+//! [`recording`] and [`replay`]; `picture`. Their front pages list their modules. This crate adds, each line using only the lines above
 //! it:
 //!
 //! * [`heartbeat`] gives signs of life of long work, [`stage_times`] measures it, [`about`] says what a build
@@ -26,6 +26,8 @@ pub use nirspi_camera::{
     account, calibration, check, events, exposure, fpga, frame_time, info, integrate, link,
     response, selftest, session, setup, signal, tally, versions,
 };
+#[cfg(not(target_family = "wasm"))]
+pub use nirspi_feed as feed;
 pub use nirspi_files as files;
 pub use nirspi_files::{boards, causes, clock, identity, provenance};
 #[cfg(not(target_family = "wasm"))]

@@ -108,7 +108,7 @@ fn sizes_and_times_of_recordings_and_feeds_are_those_of_the_code() {
     says("docs/security.md", "when the recording has {} MiB more of them", &[junk]);
     let lines = constant("host/camera/src/session.rs", "MOST");
     says("docs/security.md", "| {} lines are kept |", &[lines]);
-    let header = constant("host/files/src/feed/stream.rs", "MAX_HEADER_BYTES") / MIB;
+    let header = constant("host/feed/src/stream.rs", "MAX_HEADER_BYTES") / MIB;
     says("docs/feeds.md", "or with one of more than {} MiB", &[header]);
     let chosen = constant("host/serve/src/picture.rs", "CHOSEN_EVERY");
     says("docs/feeds.md", "are chosen again after every {} pictures", &[chosen]);

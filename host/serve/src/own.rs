@@ -128,7 +128,7 @@ mod tests {
     use super::super::stage::Stage;
     use super::*;
     use nirspi::account::LossCounters;
-    use nirspi::files::feed::Header;
+    use nirspi::feed::Header;
     use nirspi::provenance::Taken;
     use nirspi_recon::Size;
     use rand::{RngExt, SeedableRng};

@@ -1,8 +1,8 @@
 //! The first line of a feed: one JSON object.
 
-use crate::error::Shown;
-use crate::provenance::{Origin, Taken};
-use crate::trace::Raw;
+use nirspi_files::Shown;
+use nirspi_files::provenance::{Origin, Taken};
+use nirspi_files::trace::Raw;
 use nirspi_recon::law::Form;
 use nirspi_recon::{Order, Side, Size};
 use serde::Deserialize;
@@ -371,7 +371,7 @@ impl Header {
     }
 
     /// The type of a recorded reading, as NumPy writes it. A mean of samples is no integer.
-    pub(super) fn recorded(&self) -> Raw {
+    pub(crate) fn recorded(&self) -> Raw {
         match self.numbers {
             Numbers::Binary(raw) if self.samples.each == 1 => raw,
             _ => Raw::F64,

@@ -6,13 +6,13 @@
 //! beyond what one file may hold go into the next (`tests::what_one_file_cannot_hold_goes_into_the_next`).
 
 use super::header::{FeedPatterns, Header};
-use crate::FileError;
-use crate::archive::{MAX_FIELD_BYTES, Members, write_members};
-use crate::measurement::{READINGS, most_together};
-use crate::npy::{encode, encode_text, header_of};
-use crate::output::{Existing, Spool};
-use crate::plain::MAX_MEMORY_BYTES;
-use crate::provenance::{self, Provenance};
+use nirspi_files::FileError;
+use nirspi_files::MAX_MEMORY_BYTES;
+use nirspi_files::archive::{MAX_FIELD_BYTES, Members, write_members};
+use nirspi_files::measurement::{READINGS, most_together};
+use nirspi_files::npy::{encode, encode_text, header_of};
+use nirspi_files::output::{Existing, Spool};
+use nirspi_files::provenance::{self, Provenance};
 use nirspi_recon::law::Form;
 use std::io::{BufWriter, IntoInnerError, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -232,8 +232,8 @@ fn copy(path: &Path, mut spool: Spool, zip: &mut Members<'_>) -> Result<(), File
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement::{self, Readings, Selection};
-    use crate::provenance::{Made, Taken};
+    use nirspi_files::measurement::{self, Readings, Selection};
+    use nirspi_files::provenance::{Made, Taken};
 
     fn provenance() -> Provenance {
         Taken::of_file(Path::new("feed"), None).made(&Made::by("nirspi", None, [""; 0], 0))

@@ -3,10 +3,10 @@
 use super::account::Account;
 use super::header::{Header, Numbers, Samples};
 use super::trigger::{Edge, Triggered};
-use crate::error::Shown;
-use crate::measurement::is_reading;
-use crate::text;
-use crate::trace::Raw;
+use nirspi_files::Shown;
+use nirspi_files::measurement::is_reading;
+use nirspi_files::parse_number;
+use nirspi_files::trace::Raw;
 use nirspi_recon::words::count;
 use thiserror::Error;
 
@@ -162,7 +162,7 @@ impl Frames {
 
     fn word(&mut self, word: &[u8]) {
         let text = std::str::from_utf8(word).ok().filter(|word| word.len() <= MAX_WORD);
-        match text.and_then(|word| text::parse(word, '.')) {
+        match text.and_then(|word| parse_number(word, '.')) {
             Some(number) => self.sample(number),
             None => {
                 let shown: String = String::from_utf8_lossy(word).chars().take(20).collect();

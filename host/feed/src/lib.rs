@@ -1,14 +1,8 @@
-//! Live readings of any bench: a header, then numbers for ever.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+#![doc = include_str!("../README.md")]
 //!
-//! A feed is a stream of bytes at an [`Address`]: a TCP connection, a Unix socket, a pipe, a file that grows, or the
-//! standard input. Its first line is the [`Header`], one JSON object that says which patterns are shown and what the
-//! numbers are. The numbers follow as text or as little-endian bytes. One sweep of the header's patterns is one frame;
-//! [`Sweeps`](super::measurement::Sweeps) makes of each what a measurement file with the same numbers gives, and
-//! [`Recorder`] writes frames as measurement files.
-//!
-//! ```text
-//! {"n": 64, "order": "zig-zag", "readings": "pairs", "numbers": "f32", "name": "DMD of room 3"}
-//! ```
+//! A [`Feed`] reads the bytes at an [`Address`]. [`Sweeps`](nirspi_files::measurement::Sweeps) makes of each frame what a
+//! measurement file with the same numbers gives, and [`Recorder`] writes frames as measurement files.
 //!
 //! # Invariant
 //! Every number of a feed has its place in one frame, or is counted in the [`Account`]

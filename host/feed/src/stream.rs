@@ -4,7 +4,7 @@ use super::account::Account;
 use super::address::{Address, AddressError, Plain, Source, pump};
 use super::frames::{Frames, SecondHeader};
 use super::header::{Header, HeaderError, Numbers};
-use crate::trace::Raw;
+use nirspi_files::trace::Raw;
 use std::io::{self, Read};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
