@@ -158,7 +158,7 @@ fn limits_of_computing_are_those_of_the_code() {
     let gpu = constant("host/omp/src/gpu/choice.rs", "FRAMES_WORTH_A_GPU");
     says("docs/gpu.md", "For a stack of {} images or more,", &[gpu]);
     says("docs/gpu.md", "always takes a GPU for {} frames or more", &[gpu]);
-    let tried = constant("host/recon/src/reconstruct/own_matrix.rs", "TRIED");
+    let tried = constant("host/own/src/lib.rs", "TRIED");
     says("docs/own-patterns.md", "A matrix of more than {} weights", &[tried]);
     // Weights of n x n patterns of n x n pixels, as float64.
     let largest = (constant("host/files/src/plain.rs", "MAX_MEMORY_BYTES") / 8.0).powf(0.25);

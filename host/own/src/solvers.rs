@@ -3,10 +3,10 @@
 //! Each method solves a list of strengths, the strongest first. Each strength starts from the
 //! result of the one before.
 
-use crate::Size;
-use crate::omp::{DenseDictionary, Limits, OmpError, Solver, Stop, nonnegative};
-use crate::reconstruct::regularised::total_variation::{climb, descend};
 use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
+use nirspi_recon::Size;
+use nirspi_recon::gradient::{climb, descend};
+use nirspi_recon::omp::{DenseDictionary, Limits, OmpError, Solver, Stop, nonnegative};
 
 /// The most iterations of iterative methods.
 pub(super) const ITERATIONS: usize = 300;

@@ -5,8 +5,8 @@
 
 use super::OwnMatrix;
 use super::folds::Products;
-use crate::reconstruct::HeldBack;
-use crate::reconstruct::explanation::{Explanation, MOST_READINGS};
+use nirspi_recon::reconstruct::Explanation;
+use nirspi_recon::reconstruct::HeldBack;
 use std::fmt;
 
 /// Agreement in sign of a made-up scene's measurements with their predictions, in standard errors, from which the patterns
@@ -41,7 +41,7 @@ impl MatrixDoubt {
         if score(products, &products.of_a_scene(own))? < ENOUGH {
             return None;
         }
-        let most = MOST_READINGS.min(y.len() / 2);
+        let most = Explanation::MOST_READINGS.min(y.len() / 2);
         let shifts = (1..=most).flat_map(|by| {
             let (first, last) = (0..y.len() - by, by..y.len());
             let late = (by as i32, last.clone(), first.clone());
@@ -59,8 +59,8 @@ impl MatrixDoubt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruct::{MatrixMethod, MatrixSettings, Penalty};
     use crate::testing::{binary_patterns, normal, scene, side};
+    use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, Penalty};
     use rand::SeedableRng;
     use rand_pcg::Pcg64;
 

@@ -13,10 +13,10 @@
 
 use super::solvers::{self, Chosen, Condensed};
 use super::{DarkLevel, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
-use crate::Size;
-use crate::basis::{Basis, Transform};
-use crate::omp::{DenseDictionary, Stop};
 use nalgebra::{DMatrix, DVector};
+use nirspi_recon::Size;
+use nirspi_recon::basis::{Basis, Transform};
+use nirspi_recon::omp::{DenseDictionary, Stop};
 use std::sync::OnceLock;
 
 /// What the patterns at some positions say, before any measurement.

@@ -4,7 +4,7 @@ use super::super::{
     BATCH, LiveMatrix, MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty,
 };
 use super::{METHODS, patterns, scene, seen, side};
-use crate::Basis;
+use nirspi_recon::Basis;
 
 /// Measurements that differ in scene, noise and size, and one of no light.
 fn measurements(weights: &[f64]) -> Vec<Vec<f64>> {

@@ -1,5 +1,5 @@
-//! Reconstruction from measurements by a user's own patterns: any real matrix instead of Hadamard
-//! rows.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+#![doc = include_str!("../README.md")]
 //!
 //! # Invariant
 //! Nothing is assumed about the patterns. The strength of a penalty, or the number of atoms, is the
@@ -23,7 +23,7 @@
 //!
 //! `A` are the patterns, one in each row, `y` the measurements, `c` the coefficients of the image
 //! in a basis, and `s` their expected sizes (amplitudes as one over frequency, as in
-//! [`OmpSettings`](super::OmpSettings)):
+//! [`OmpSettings`](nirspi_recon::reconstruct::OmpSettings)):
 //!
 //! | method | the image is |
 //! |---|---|
@@ -50,14 +50,14 @@ mod pseudo_inverse;
 mod solvers;
 mod symmetric;
 
-use super::{HeldBack, Penalty};
-use crate::basis::{Basis, Transform};
-use crate::omp::Stop;
-use crate::{Image, Shape, Size};
 pub use doubt::MatrixDoubt;
 pub use error::MatrixError;
 pub use live::LiveMatrix;
 use nalgebra::{DMatrix, DVector};
+use nirspi_recon::basis::{Basis, Transform};
+use nirspi_recon::omp::Stop;
+use nirspi_recon::reconstruct::{HeldBack, MatrixMethod, MatrixSettings, Penalty};
+use nirspi_recon::{Image, Shape, Size};
 pub use noise::{KnownNoise, NoiseFrom};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -72,76 +72,6 @@ pub struct OwnMatrix {
     rank: usize,
     /// Squared norm of each pattern, if all patterns are orthogonal to each other.
     orthogonal: Option<DVector<f64>>,
-}
-
-/// The method of inversion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum MatrixMethod {
-    /// Tikhonov's or total variation, whichever better predicts held-back measurements. Tikhonov's
-    /// for as many orthogonal patterns as pixels, for over 2^20 weights, for atoms of one's own, and
-    /// where the strength is given.
-    Best,
-    /// Least squares of least norm.
-    PseudoInverse,
-    /// The minimum of a sum with a penalty.
-    Penalty(Penalty),
-    /// Few coefficients.
-    Omp,
-}
-
-/// Settings of [`OwnMatrix::reconstruct`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct MatrixSettings {
-    /// The method of inversion.
-    pub method: MatrixMethod,
-    /// Basis of the coefficients.
-    pub basis: Basis,
-    /// Images of the matrix's size, one after another, as atoms instead of a basis.
-    pub atoms: Option<Vec<f32>>,
-    /// Strength of a penalty, `t` in the module's table. By default, the strength that best
-    /// predicts held-back measurements.
-    pub strength: Option<f64>,
-    /// Number of atoms for OMP. By default, the number that best predicts held-back measurements.
-    pub sparsity: Option<usize>,
-    /// Whether OMP's coefficients must be non-negative.
-    pub non_negative: bool,
-    /// Whether a dark level is fitted with the image.
-    pub dark: bool,
-    /// Standard deviation of the noise of a measurement, if it is [known](OwnMatrix::known_noise). Tikhonov's strength is then
-    /// the one at which the measurements are most likely.
-    pub noise: Option<f64>,
-    /// What that noise is at most, for each of the measurements, where it is not known and more than the measurement says so.
-    /// Only complete sets of orthogonal patterns need it: other measurements predict each other.
-    pub most_noise: Vec<Option<f64>>,
-    /// Whether held-back measurements are to say how well the others predict them, where it does not take long.
-    pub judge: bool,
-}
-
-impl MatrixSettings {
-    /// Default settings: all values are found from the measurements, in the DCT basis.
-    #[must_use]
-    pub fn new(method: MatrixMethod) -> Self {
-        let (atoms, strength, sparsity) = (None, None, None);
-        Self {
-            method,
-            basis: Basis::Dct,
-            atoms,
-            strength,
-            sparsity,
-            non_negative: false,
-            dark: true,
-            noise: None,
-            most_noise: Vec::new(),
-            judge: true,
-        }
-    }
-
-    /// The settings of these measurements alone, by their numbers.
-    fn of_some(&self, which: &[usize]) -> Self {
-        let most_noise = &self.most_noise;
-        let most_noise = which.iter().map(|&at| most_noise.get(at).copied().flatten()).collect();
-        Self { most_noise, ..self.clone() }
-    }
 }
 
 /// The result of [`OwnMatrix::reconstruct`].
@@ -553,5 +483,7 @@ fn rank(patterns: &DMatrix<f64>) -> usize {
     size
 }
 
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,8 @@
 //! Why patterns of one's own give no image.
 
-use crate::Size;
-use crate::basis::Basis;
-use crate::omp::OmpError;
+use nirspi_recon::Size;
+use nirspi_recon::basis::Basis;
+use nirspi_recon::omp::OmpError;
 use thiserror::Error;
 
 /// Why a matrix, its measurements or a setting is refused.

@@ -12,8 +12,8 @@
 
 use super::problem::Fit;
 use super::{DarkLevel, MatrixMethod, MatrixSettings, OwnMatrix, Penalty, STRENGTHS};
-use crate::basis::Basis;
 use nalgebra::DVector;
+use nirspi_recon::basis::Basis;
 
 /// Relative difference of norms that counts as rounding.
 const SAME: f64 = 1e-9;

@@ -1,10 +1,11 @@
 //! Images that are no square, or squares without a Hadamard matrix.
 
 use super::{METHODS, patterns, seen};
-use crate::reconstruct::{MatrixError, MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
 use crate::testing::{correlation_of, side};
-use crate::{Basis, Image, Size};
+use crate::{MatrixError, OwnMatrix};
 use nalgebra::DMatrix;
+use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, Penalty};
+use nirspi_recon::{Basis, Image, Size};
 
 /// A dark image with two bright parts, which no symmetry maps onto itself.
 fn scene(size: Size) -> Vec<f64> {
@@ -66,7 +67,7 @@ fn transposed_patterns_give_the_transposed_image() {
 #[test]
 fn complete_orthogonal_sets_of_any_shape_are_inverted_in_one_step() {
     let size = Size::new(6, 10).unwrap();
-    let cosine = |n: usize, k: usize, p: usize| crate::basis::cosine(n, k, p);
+    let cosine = |n: usize, k: usize, p: usize| nirspi_recon::basis::cosine(n, k, p);
     let weights: Vec<f64> = (0..60 * 60)
         .map(|at| (at / 60, at % 60))
         .map(|(k, p)| cosine(6, k / 10, p / 10) * cosine(10, k % 10, p % 10))

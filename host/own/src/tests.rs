@@ -1,11 +1,12 @@
 mod folds;
 mod many;
+mod same_images;
 mod shapes;
 
 use super::*;
-use crate::Side;
-use crate::reconstruct::hadamard;
 use crate::testing::{binary_patterns, correlation_of, measured, normal, scene, side};
+use nirspi_recon::Side;
+use nirspi_recon::reconstruct::hadamard;
 
 const METHODS: [MatrixMethod; 5] = [
     MatrixMethod::PseudoInverse,

@@ -6,9 +6,9 @@
 //! same form: its measurement is never called wrong.
 
 use super::{OwnMatrix, energies};
-use crate::basis::{Basis, Transform};
-use crate::law::few;
 use nalgebra::DVector;
+use nirspi_recon::basis::{Basis, Transform};
+use nirspi_recon::law::few;
 
 /// A measurement at least this many standard deviations from the others is not of their scene. A normal number lies there with
 /// a probability of 1e-15.
@@ -123,15 +123,16 @@ fn is_formless(own: &OwnMatrix, k: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruct::{LiveMatrix, MatrixMethod, MatrixSettings};
+    use crate::LiveMatrix;
     use crate::testing::{binary_patterns, scene, side};
-    use crate::{Image, Side};
+    use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings};
+    use nirspi_recon::{Image, Side};
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
 
-    fn correlation(image: &Image<crate::Size>, truth: &[f64]) -> f64 {
+    fn correlation(image: &Image<nirspi_recon::Size>, truth: &[f64]) -> f64 {
         let truth: Vec<f32> = truth.iter().map(|&v| v as f32).collect();
-        crate::metrics::correlation(image.pixels(), &truth, 16, 16).unwrap()
+        nirspi_recon::metrics::correlation(image.pixels(), &truth, 16, 16).unwrap()
     }
 
     #[test]

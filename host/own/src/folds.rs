@@ -14,10 +14,11 @@ use super::symmetric::Symmetric;
 use super::{
     DarkLevel, MatrixSettings, OwnMatrix, SPLIT_SEED, STRENGTHS, energies, images, last_as_good,
 };
-use crate::Size;
-use crate::basis::{Basis, Transform};
-use crate::reconstruct::{HeldBack, noise};
 use nalgebra::DVector;
+use nirspi_recon::Size;
+use nirspi_recon::basis::{Basis, Transform};
+use nirspi_recon::quadrature::{quadrature, signs};
+use nirspi_recon::reconstruct::HeldBack;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::ops::Range;
@@ -113,7 +114,7 @@ impl Products {
     }
 
     /// The strength at which the measurements are most likely with noise of this standard deviation; `None` for measurements
-    /// that say nothing. The model is that of [`noise`]: coefficients are normal with variance `a s^2`, the noise with `a t`.
+    /// that say nothing. The model is that of [`quadrature`](nirspi_recon::quadrature): coefficients are normal with variance `a s^2`, the noise with `a t`.
     pub(super) fn likeliest(&self, own: &OwnMatrix, y: &[f64], sigma: f64) -> Option<f64> {
         let (y, parts) = (DVector::from_column_slice(y), Vec::new());
         let folds = Folds { own, of: self, y, strengths: Vec::new(), parts };
@@ -128,11 +129,10 @@ impl Products {
         let times = |v: &[f32]| {
             rounded(part.projected(self.products.times(&part.projected(vector(v)))) * run.scale)
         };
-        let readings = noise::quadrature(rounded(run.direction.clone()), count, times)?;
+        let readings = quadrature(rounded(run.direction.clone()), count, times)?;
         let ones = vec![1.0; folds.y.len()];
-        let probes = noise::signs(&ones).map(|signs| rounded(part.projected(vector(&signs))));
-        let probes: Vec<_> =
-            probes.filter_map(|signs| noise::quadrature(signs, count, times)).collect();
+        let probes = signs(&ones).map(|signs| rounded(part.projected(vector(&signs))));
+        let probes: Vec<_> = probes.filter_map(|signs| quadrature(signs, count, times)).collect();
         let count = count as f64;
         let likelihood = |strength: &f64| {
             let determinants: f64 =

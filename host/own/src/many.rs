@@ -14,10 +14,10 @@ use super::{
     MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, OwnMatrix, Penalty,
     SPARSITIES, STRENGTHS, TRIED, as_good_as_the_best, complete, folds, last_as_good,
 };
-use crate::Image;
-use crate::omp::Stop;
-use crate::reconstruct::HeldBack;
 use nalgebra::DVector;
+use nirspi_recon::Image;
+use nirspi_recon::omp::Stop;
+use nirspi_recon::reconstruct::HeldBack;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 

@@ -5,8 +5,8 @@
 //! explain better than noise would be is one of scenes, and says nothing of the noise.
 
 use super::OwnMatrix;
-use crate::basis::{Basis, Transform};
 use nalgebra::{DMatrix, DVector};
+use nirspi_recon::basis::{Basis, Transform};
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -159,8 +159,8 @@ fn variance_of_change(coarse: &DMatrix<f64>, one: &[f64], next: &[f64]) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruct::{MatrixMethod, MatrixSettings, Penalty};
     use crate::testing::{normal, scene, side};
+    use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, Penalty};
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64;
 

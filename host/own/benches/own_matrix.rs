@@ -1,11 +1,12 @@
 //! Times reconstructions from patterns of a user's own, more of them than pixels.
 //!
-//! `cargo bench -p nirspi-recon --bench own_matrix`
+//! `cargo bench -p nirspi-own --bench own_matrix`
 #![expect(clippy::unwrap_used, reason = "a failed unwrap ends the benchmark")]
 
 use divan::{Bencher, black_box};
+use nirspi_own::OwnMatrix;
 use nirspi_recon::Side;
-use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, OwnMatrix, Penalty};
+use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, Penalty};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
