@@ -3,13 +3,14 @@
 //!
 //! Data flows one way: bytes -> frames -> measurements -> image -> picture.
 //!
-//! `nirspi-files`, `nirspi-camera` and `nirspi-record` are here under one name: [`files`] with
-//! [`provenance`]; [`session`] and all that a camera says; [`capture`], [`recording`] and [`replay`]. Their
-//! front pages list their modules. This crate adds, each line using only the lines above it:
+//! `nirspi-files`, `nirspi-feed`, `nirspi-camera`, `nirspi-record` and `nirspi-picture` are here under one
+//! name: [`files`] with [`provenance`]; `feed`; [`session`] and all that a camera says; [`capture`],
+//! [`recording`] and [`replay`]; `picture`. Their front pages list their modules. This crate adds, each line using only the lines above
+//! it:
 //!
 //! * [`heartbeat`] gives signs of life of long work, [`stage_times`] measures it, [`about`] says what a build
 //!   contains, [`depth_image`] is what a camera's depth sensor sees in its image,
-//! * [`picture`] draws, [`scene`] is what a camera looks at,
+//! * [`scene`] is what a camera looks at,
 //! * [`source`] reads measurements from a file, a recording or a capture, `nirspi-recon` reconstructs
 //!   images, [`imaging`] scales, enhances and judges them and gives warnings,
 //! * `patterns` writes patterns for a projector,
@@ -25,11 +26,15 @@ pub use nirspi_camera::{
     account, calibration, check, events, exposure, fpga, frame_time, info, integrate, link,
     response, selftest, session, setup, signal, tally, versions,
 };
+#[cfg(not(target_family = "wasm"))]
+pub use nirspi_feed as feed;
 pub use nirspi_files as files;
 pub use nirspi_files::{boards, causes, clock, identity, provenance};
 #[cfg(not(target_family = "wasm"))]
 pub use nirspi_record::{address, devices, udev};
 pub use nirspi_record::{capture, recording, replay};
+#[cfg(feature = "pictures")]
+pub use pictures as picture;
 
 pub mod about;
 pub mod depth_image;
@@ -43,8 +48,6 @@ pub mod moving;
 pub mod order_table;
 #[cfg(all(feature = "pictures", not(target_family = "wasm")))]
 pub mod patterns;
-#[cfg(feature = "pictures")]
-pub mod picture;
 #[cfg(not(target_family = "wasm"))]
 pub mod problem;
 #[cfg(all(feature = "enhance", not(target_family = "wasm")))]

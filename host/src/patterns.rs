@@ -205,7 +205,7 @@ fn bits(row: u32, light: bool, n: usize, scale: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::feed::Header;
+    use crate::feed::Header;
     use crate::files::image::read_grey;
     use crate::order_table::read_order_table;
     use nirspi_recon::Measurements;

@@ -3,8 +3,8 @@
 use crate::account::LossCounters;
 use crate::calibration::{FlatField, KeptFlatField};
 use crate::capture::Capture;
+use crate::feed::{Header, OwnPatterns};
 use crate::files::FileError;
-use crate::files::feed::{Header, OwnPatterns};
 use crate::files::measurement::{
     self, Form, MeasurementFile, Readings, Reference, Selection, Sweeps,
 };

@@ -303,7 +303,7 @@ fn callers(folder: &Path, found: &mut Vec<String>) {
     for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
         let name = entry.file_name().unwrap().to_string_lossy();
         let left_out =
-            ["tests", "tests.rs", "benches", "examples", "target", "recon", "omp", "nets"];
+            ["tests", "tests.rs", "benches", "examples", "target", "recon", "omp", "own", "nets"];
         if left_out.contains(&&*name) || entry.is_symlink() {
             continue;
         }

@@ -108,7 +108,7 @@ fn sizes_and_times_of_recordings_and_feeds_are_those_of_the_code() {
     says("docs/security.md", "when the recording has {} MiB more of them", &[junk]);
     let lines = constant("host/camera/src/session.rs", "MOST");
     says("docs/security.md", "| {} lines are kept |", &[lines]);
-    let header = constant("host/files/src/feed/stream.rs", "MAX_HEADER_BYTES") / MIB;
+    let header = constant("host/feed/src/stream.rs", "MAX_HEADER_BYTES") / MIB;
     says("docs/feeds.md", "or with one of more than {} MiB", &[header]);
     let chosen = constant("host/serve/src/picture.rs", "CHOSEN_EVERY");
     says("docs/feeds.md", "are chosen again after every {} pictures", &[chosen]);
@@ -119,7 +119,7 @@ fn sizes_and_times_of_recordings_and_feeds_are_those_of_the_code() {
 #[test]
 fn sizes_of_figures_are_those_of_the_code() {
     let page = "docs/results.md";
-    let look = "host/src/picture/look.rs";
+    let look = "host/picture/src/look.rs";
     let of = |style: &str| numbers(look, &format!("Self::{style} => light("), ")");
     let (paper, column, slide) = (of("Paper"), of("Column"), of("Slide"));
     says(
@@ -140,13 +140,13 @@ fn sizes_of_figures_are_those_of_the_code() {
         "| `screen` | dark | {} pixels | {} points | {} dpi |",
         &[pixels, screen[2], screen[3]],
     );
-    let percentiles = numbers("host/src/picture/scale.rs", "PERCENTILES: [f64; 2] = [", "]");
+    let percentiles = numbers("host/picture/src/scale.rs", "PERCENTILES: [f64; 2] = [", "]");
     says(page, "The percentiles {} and {} of the image's pixels", &percentiles);
-    let sheet = |name: &str| constant("host/src/picture/sheet.rs", name);
+    let sheet = |name: &str| constant("host/picture/src/sheet.rs", name);
     says(page, "Of more than {} images, the sheet shows {}, evenly chosen", &[sheet("MOST"); 2]);
     let (rate, most) = (
-        constant("host/src/picture/video.rs", "RATE_HZ"),
-        constant("host/src/picture/video.rs", "MOST"),
+        constant("host/picture/src/video.rs", "RATE_HZ"),
+        constant("host/picture/src/video.rs", "MOST"),
     );
     says(page, "a video of {} frames a second", &[rate]);
     says(page, "of up to {} frames, evenly chosen", &[sheet("MOST_BESIDE")]);
@@ -158,7 +158,7 @@ fn limits_of_computing_are_those_of_the_code() {
     let gpu = constant("host/omp/src/gpu/choice.rs", "FRAMES_WORTH_A_GPU");
     says("docs/gpu.md", "For a stack of {} images or more,", &[gpu]);
     says("docs/gpu.md", "always takes a GPU for {} frames or more", &[gpu]);
-    let tried = constant("host/recon/src/reconstruct/own_matrix.rs", "TRIED");
+    let tried = constant("host/own/src/lib.rs", "TRIED");
     says("docs/own-patterns.md", "A matrix of more than {} weights", &[tried]);
     // Weights of n x n patterns of n x n pixels, as float64.
     let largest = (constant("host/files/src/plain.rs", "MAX_MEMORY_BYTES") / 8.0).powf(0.25);

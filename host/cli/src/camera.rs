@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use nirspi::address::CameraAddress;
 use nirspi::devices;
 use nirspi::exposure::{Exposure, Length, Light};
-use nirspi::files::feed::Address as FeedAddress;
+use nirspi::feed::Address as FeedAddress;
 use nirspi::order_table::read_order_table;
 use nirspi::scene::{SceneMap, SceneSource};
 use nirspi::setup::MeasurementSetup;

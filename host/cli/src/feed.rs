@@ -5,7 +5,7 @@ use super::progress::Progress;
 use super::{Usage, print, provenance, reconstruct, settings};
 use anyhow::{Context, Result, bail};
 use nirspi::capture::{FeedProgress, FeedReport, StopCause, record_feed};
-use nirspi::files::feed::{Feed, FeedError, Recorder};
+use nirspi::feed::{Feed, FeedError, Recorder};
 use nirspi::files::interrupt;
 use nirspi::files::output::Existing;
 use nirspi::source::Source;

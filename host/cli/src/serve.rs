@@ -9,7 +9,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use nirspi::address::CameraAddress;
 use nirspi::capture::Choice;
 use nirspi::exposure::Light;
-use nirspi::files::feed::{Address, Feed};
+use nirspi::feed::{Address, Feed};
 use nirspi::files::{interrupt, read_small_text};
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;

@@ -34,7 +34,7 @@ const OTHERS: [(&str, &str); 3] = [
 ];
 /// The largest field read into memory. A 256 x 256 sweep of raw pairs in float64 is 1 MiB; the
 /// limit is 256 times as much.
-pub(super) const MAX_FIELD_BYTES: u64 = 256 << 20;
+pub const MAX_FIELD_BYTES: u64 = 256 << 20;
 
 /// An open archive.
 pub struct Archive {

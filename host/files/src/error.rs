@@ -183,7 +183,8 @@ fn reason(error: &io::Error) -> String {
 
 /// Text from outside the program, prepared for one line: control characters are escaped and the
 /// length is limited.
-pub(super) struct Shown {
+#[derive(Debug)]
+pub struct Shown {
     text: String,
     limit: usize,
 }
@@ -201,7 +202,9 @@ impl Shown {
         Self { text: path.display().to_string(), limit: Self::PATH_LIMIT }
     }
 
-    pub(super) fn text(text: &str) -> Self {
+    /// Words of a file or of a stream, of which the first characters are shown.
+    #[must_use]
+    pub fn text(text: &str) -> Self {
         Self { text: text.to_owned(), limit: Self::TEXT_LIMIT }
     }
 

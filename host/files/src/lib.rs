@@ -19,8 +19,6 @@ pub mod clock;
 #[cfg(not(target_family = "wasm"))]
 pub mod contents;
 #[cfg(not(target_family = "wasm"))]
-pub mod feed;
-#[cfg(not(target_family = "wasm"))]
 pub mod folder;
 pub mod identity;
 #[cfg(feature = "pictures")]
@@ -59,5 +57,7 @@ mod testing;
 #[cfg(not(target_family = "wasm"))]
 mod text;
 
-pub use error::FileError;
-pub use plain::{read_at_most, read_small, read_small_text, read_text};
+pub use error::{FileError, Shown};
+pub use plain::{MAX_MEMORY_BYTES, read_at_most, read_small, read_small_text, read_text};
+#[cfg(not(target_family = "wasm"))]
+pub use text::parse as parse_number;

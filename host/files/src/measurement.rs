@@ -64,15 +64,14 @@ use opened::Opened;
 pub use patterns::{PatternSelection, Patterns};
 pub use plain::{PlainSweeps, read_plain, read_plain_all};
 use rayon::prelude::*;
-pub(crate) use readings::is_reading;
+pub use readings::is_reading;
 pub use remedy::Remedy;
 pub use stack::Stack;
 use std::ops::Range;
 use std::path::Path;
 pub use sweeps::{Sweeps, most_together};
 pub use weighed::Plain;
-pub(crate) use write::READINGS;
-pub use write::{encode, noise_of, write_readings};
+pub use write::{READINGS, encode, noise_of, write_readings};
 
 /// What to read from a file, and what the file itself does not say.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -273,7 +273,12 @@ pub(super) fn read_text(stream: &mut impl Read) -> Option<String> {
     if letters.checked_mul(4) == Some(text.len()) { read() } else { None }
 }
 
-pub(super) fn header_of(descr: &str, shape: &[usize]) -> Vec<u8> {
+/// The heading of a `.npy` file of numbers of this type (as NumPy writes it: `<f8`) in C order. The numbers follow.
+///
+/// # Panics
+/// If the shape has a hundred axes or more.
+#[must_use]
+pub fn header_of(descr: &str, shape: &[usize]) -> Vec<u8> {
     /// The data start at a multiple of this number of bytes, so that NumPy can map the file.
     const ALIGNMENT: usize = 64;
     let axes: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();

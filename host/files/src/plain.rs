@@ -11,7 +11,7 @@ use std::path::Path;
 pub(super) const NUMPY: &[u8; 6] = b"\x93NUMPY";
 
 /// The most memory that the numbers of a file take: a field of measurements, or a picture with its grey levels.
-pub(super) const MAX_MEMORY_BYTES: u64 = 512 << 20;
+pub const MAX_MEMORY_BYTES: u64 = 512 << 20;
 
 /// Opens a plain file. Every error names the path.
 pub(super) fn open_file(path: &Path, expected: &'static str) -> Result<(File, u64), FileError> {

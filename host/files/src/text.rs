@@ -12,7 +12,7 @@
 mod export;
 mod number;
 
-pub(super) use number::parse;
+pub use number::parse;
 
 use super::FileError;
 use super::field::Field;

@@ -72,19 +72,24 @@ impl Raw {
     }
 
     /// The type as NumPy writes it.
-    pub(super) fn descr(self) -> &'static str {
+    #[must_use]
+    pub fn descr(self) -> &'static str {
         self.facts().3
     }
 
     /// The number in these bytes, as many as a number of this kind has.
-    pub(super) fn number(self, bytes: &[u8]) -> f64 {
+    ///
+    /// # Panics
+    /// If there are fewer bytes.
+    #[must_use]
+    pub fn number(self, bytes: &[u8]) -> f64 {
         let mut number = Vec::with_capacity(1);
         self.numbers(bytes, &mut number);
         number[0]
     }
 
     /// Appends the numbers in these bytes.
-    pub(super) fn numbers(self, bytes: &[u8], numbers: &mut Vec<f64>) {
+    pub fn numbers(self, bytes: &[u8], numbers: &mut Vec<f64>) {
         fn each<const N: usize>(
             bytes: &[u8],
             numbers: &mut Vec<f64>,
@@ -101,7 +106,7 @@ impl Raw {
     }
 
     /// Appends the bytes of a number. A number beyond the kind's range becomes its nearest.
-    pub(super) fn append(self, number: f64, bytes: &mut Vec<u8>) {
+    pub fn append(self, number: f64, bytes: &mut Vec<u8>) {
         match self {
             Self::F32 => bytes.extend_from_slice(&(number as f32).to_le_bytes()),
             Self::F64 => bytes.extend_from_slice(&number.to_le_bytes()),

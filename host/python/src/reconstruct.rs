@@ -12,10 +12,10 @@ use crate::work::{backend, long};
 use nirspi::imaging::MethodReport;
 use nirspi::source::{FirstPatterns, Index, Several};
 use nirspi_nets::{deblur, fusion};
+use nirspi_own::{KnownNoise, NoiseFrom, OwnMatrix};
 use nirspi_recon::reconstruct::{
-    KnownNoise, MatrixMethod, MatrixSettings, Method, MethodSettings, NoiseFrom, OwnAtoms,
-    OwnMatrix, Penalty, Reconstruct, ReconstructError, Reconstruction, Report, Setting, Sparsity,
-    Strength, stack_while,
+    MatrixMethod, MatrixSettings, Method, MethodSettings, OwnAtoms, Penalty, Reconstruct,
+    ReconstructError, Reconstruction, Report, Setting, Sparsity, Strength, stack_while,
 };
 use nirspi_recon::{Basis, Measurements, Rows, Sampling, SamplingError, ShorterSweep, Size};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};

@@ -173,7 +173,8 @@ fn all_equal(y: &[f64], form: Form) -> Option<Doubt> {
 }
 
 /// The most readings, of this many, that count as a few.
-pub(crate) fn few(of: usize) -> usize {
+#[must_use]
+pub fn few(of: usize) -> usize {
     match of {
         // One of three is not a few.
         0..=7 => 0,

@@ -16,15 +16,19 @@
 //! | [`omp`] | measurements and a dictionary | a few coefficients that explain the measurements |
 //! | [`reconstruct`] | measurements | an image |
 //! | [`Repeats`] | measurements of one scene, one after another | their noise |
+//! | [`quadrature`] | products with a symmetric matrix | sums over its eigenvalues |
+//! | [`gradient`] | an image | a step along its gradient |
 //! | [`metrics`] | two images | a number that compares them |
 //! | [`backend`] | the name of a backend | a [`Backend`] |
 //! | [`Sampling`] | `0.3`, `30%` or `30` | a checked share of the patterns |
 //! | [`words`] | a count, a number | the same as people write it |
 
+pub mod gradient;
 pub mod law;
 pub mod leak;
 mod measurements;
 pub mod metrics;
+pub mod quadrature;
 pub mod reconstruct;
 mod repeats;
 #[cfg(test)]

@@ -31,11 +31,11 @@ mod explanation;
 mod frame;
 mod held_back;
 mod kind;
+mod matrix;
 mod method;
 mod methods;
 mod noise;
 mod own_atoms;
-mod own_matrix;
 pub mod prior;
 mod pursuit;
 mod recursive;
@@ -52,14 +52,11 @@ pub use explanation::Explanation;
 pub use frame::{believed_frame, fused_frame};
 pub use held_back::HeldBack;
 pub use kind::GoingOn;
+pub use matrix::{MatrixMethod, MatrixSettings};
 pub use method::{Method, MethodSettings, OwnAtoms, ParseMethodError, Reconstruct, Setting};
 pub use methods::hadamard;
 pub use noise::estimated_noise;
 pub use own_atoms::omp_over;
-pub use own_matrix::{
-    DarkLevel, KnownNoise, LiveMatrix, MatrixDoubt, MatrixError, MatrixMethod,
-    MatrixReconstruction, MatrixSettings, NoiseFrom, OwnMatrix,
-};
 pub use recursive::{Recursive, RecursiveFrame, RecursiveSettings};
 pub use regularised::{Penalty, Regularised, RegularisedSettings, Strength, regularised};
 pub use report::{Reconstruction, Report};

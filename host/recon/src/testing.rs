@@ -54,27 +54,6 @@ pub(crate) fn noisy(rows: &Rows, scene: &[f64], sigma: f64, seed: u64) -> Measur
     Measurements::from_differential(rows, &values).unwrap()
 }
 
-/// Weights of patterns of zeros and ones, one after another, and their measurements of a scene with
-/// normal noise of this deviation.
-pub(crate) fn binary_patterns(
-    count: usize,
-    scene: &[f64],
-    sigma: f64,
-    seed: u64,
-) -> (Vec<f64>, Vec<f64>) {
-    let mut random = Pcg64::seed_from_u64(seed);
-    let weights: Vec<f64> =
-        (0..count * scene.len()).map(|_| f64::from(u8::from(random.random::<bool>()))).collect();
-    let y = weights
-        .chunks_exact(scene.len())
-        .map(|pattern| {
-            let light: f64 = pattern.iter().zip(scene).map(|(w, v)| w * v).sum();
-            light + sigma * normal(&mut random)
-        })
-        .collect();
-    (weights, y)
-}
-
 /// Readings of a perfect detector: pattern, complement, pattern, ...
 pub(crate) fn readings(side: Side, rows: &[u32], scene: &[f64]) -> Vec<f64> {
     let total: f64 = scene.iter().sum();

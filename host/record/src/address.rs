@@ -1,12 +1,12 @@
 //! The addresses of cameras: `virtual`, `usb`, `usb:SERIAL`, `tcp:HOST:PORT`, `serial:PATH[:BAUD]` and
-//! `replay:REC[,SPEED]`; and of [feeds](nirspi_files::feed), `feed:ADDR`, which are benches of any other kind.
+//! `replay:REC[,SPEED]`; and of [feeds](nirspi_feed), `feed:ADDR`, which are benches of any other kind.
 
 use crate::recording::RecordingError;
 use crate::replay::{ReplayAddress, ReplayLink};
 use nirspi_camera::link::usb::UsbError;
 use nirspi_camera::link::{DEFAULT_BAUD, Link, SerialLink, TcpLink, UsbLink};
 use nirspi_camera::session::{Session, SessionError};
-use nirspi_files::feed::Address as FeedAddress;
+use nirspi_feed::Address as FeedAddress;
 use std::fmt;
 use std::io;
 use std::path::PathBuf;

@@ -6,7 +6,7 @@ use nirspi::boards;
 use nirspi::clock::{self, Instant};
 use nirspi::events::Level;
 #[cfg(feature = "server")]
-use nirspi::files::feed::{Account, Header};
+use nirspi::feed::{Account, Header};
 use nirspi::identity::CameraIdentity;
 #[cfg(feature = "server")]
 use nirspi::provenance::{Origin, Taken};

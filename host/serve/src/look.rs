@@ -4,9 +4,9 @@ use nirspi::account::LossCounters;
 use nirspi::calibration::FlatField;
 use nirspi::clock::Instant;
 #[cfg(feature = "server")]
-use nirspi::files::FileError;
+use nirspi::feed::{Header, OwnPatterns, mean};
 #[cfg(feature = "server")]
-use nirspi::files::feed::{Header, OwnPatterns, mean};
+use nirspi::files::FileError;
 #[cfg(feature = "server")]
 use nirspi::files::measurement::{Plain, PlainSweeps, Sweeps};
 use nirspi::integrate::{IntegrateError, Newest};

@@ -8,8 +8,9 @@ use nirspi::clock::Instant;
 use nirspi::files::measurement::{Patterns, Plain};
 use nirspi::imaging::{SteadyWhite, White};
 use nirspi::reconstruct::{matrix_doubts, matrix_warnings};
+use nirspi_own::{LiveMatrix, OwnMatrix};
 use nirspi_recon::reconstruct::{
-    LiveMatrix, MatrixSettings, Method, MethodSettings, OwnMatrix, ReconstructError, Strength,
+    MatrixSettings, Method, MethodSettings, ReconstructError, Strength,
 };
 use std::sync::Arc;
 
@@ -128,7 +129,7 @@ mod tests {
     use super::super::stage::Stage;
     use super::*;
     use nirspi::account::LossCounters;
-    use nirspi::files::feed::Header;
+    use nirspi::feed::Header;
     use nirspi::provenance::Taken;
     use nirspi_recon::Size;
     use rand::{RngExt, SeedableRng};

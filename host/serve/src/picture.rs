@@ -8,7 +8,7 @@ use nirspi::clock::{self, Instant};
 use nirspi::imaging::EnhanceError;
 use nirspi_nets::WeightsError;
 #[cfg(feature = "server")]
-use nirspi_recon::reconstruct::MatrixError;
+use nirspi_own::MatrixError;
 use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::{Image, Shape};
 use serde::Serialize;

@@ -7,8 +7,8 @@
 use super::trial::{Guess, Judge};
 use super::ways::Trials;
 use super::{InspectError, Inspection, MOST, PICTURES};
+use crate::feed::{Account, Address, Feed, FeedError, Header, Mean, Next};
 use crate::files::contents::Contents;
-use crate::files::feed::{Account, Address, Feed, FeedError, Header, Mean, Next};
 use crate::files::measurement::Sweeps;
 use nirspi_recon::words::count;
 use serde::Serialize;

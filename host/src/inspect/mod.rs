@@ -19,9 +19,9 @@ pub use feed::FeedSeen;
 pub use other::Finding;
 pub use trial::Guess;
 
+use crate::feed::{Address, FeedError};
 use crate::files::FileError;
 use crate::files::contents::{Array, Contents};
-use crate::files::feed::{Address, FeedError};
 use crate::provenance::Taken;
 use crate::recording::{RecordingError, RecordingInfo};
 use crate::source::{Source, SourceError, SourceOptions};

@@ -10,9 +10,9 @@ use crate::imaging::{HeldBackReport, by_chance};
 use crate::picture::{FigureStyle, Pictures, Unit};
 use crate::provenance;
 use crate::stage_times::StageTimes;
+use nirspi_own::{DarkLevel, KnownNoise, MatrixError, MatrixReconstruction, NoiseFrom, OwnMatrix};
 use nirspi_recon::reconstruct::{
-    DarkLevel, KnownNoise, MatrixError, MatrixMethod, MatrixReconstruction, MatrixSettings, Method,
-    MethodSettings, NoiseFrom, OwnMatrix, Penalty, Setting, Sparsity,
+    MatrixMethod, MatrixSettings, Method, MethodSettings, Penalty, Setting, Sparsity,
 };
 use nirspi_recon::words::count_of;
 use nirspi_recon::{Image, Sampling, Size};

@@ -80,8 +80,8 @@ const SECTIONS: [Section; 17] = [
     section("LampReport", "host/src/reconstruct/one.rs", "Lamp", ""),
     section("LossCounters", "host/camera/src/account.rs", "Account of frames", ""),
     section("Skipped", "host/src/reconstruct/many.rs", "File without an image", ""),
-    section("Entry", "host/src/picture/report.rs", "Picture", ""),
-    section("Shown", "host/src/picture/report.rs", "Image in a picture", ""),
+    section("Entry", "host/picture/src/report.rs", "Picture", ""),
+    section("Shown", "host/picture/src/report.rs", "Image in a picture", ""),
     section(
         "Provenance",
         "host/files/src/provenance.rs",
@@ -94,7 +94,7 @@ const SECTIONS: [Section; 17] = [
 /// Structures without a section, whose fields stand among those of others.
 const AMONG_OTHERS: [(&str, &str); 4] = [
     ("OwnInput", "host/src/reconstruct/own.rs"),
-    ("Scale", "host/src/picture/scale.rs"),
+    ("Scale", "host/picture/src/scale.rs"),
     ("Taken", "host/files/src/provenance.rs"),
     ("Made", "host/files/src/provenance.rs"),
 ];

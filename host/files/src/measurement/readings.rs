@@ -13,7 +13,8 @@ use nirspi_recon::law::OVERLOAD;
 use std::path::Path;
 
 /// Whether a number of a file is a reading. NaN and the numbers by which instruments report an overload are none.
-pub(crate) fn is_reading(value: f64) -> bool {
+#[must_use]
+pub fn is_reading(value: f64) -> bool {
     value.abs() < OVERLOAD
 }
 

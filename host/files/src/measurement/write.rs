@@ -10,7 +10,7 @@ use nirspi_recon::Measurements;
 use std::path::Path;
 
 /// The field of an `.npz` file with the form of `y`, as text.
-pub(crate) const READINGS: &str = "readings";
+pub const READINGS: &str = "readings";
 
 /// Readings that are encoded at a time.
 const PIECE: usize = 1 << 13;

@@ -32,6 +32,7 @@ pub(super) const OVERLOAD: f64 = 9.9e37;
 
 /// The number that a word states, with the point or comma of its decimals; NaN for a reading that was not
 /// taken, 9.9e37 for one beyond what an instrument measures.
+#[must_use]
 pub fn parse(word: &str, decimal: char) -> Option<f64> {
     let bytes = word.as_bytes();
     let word = match bytes.first() == Some(&b'"') || bytes.last() == Some(&b'"') {

@@ -1,6 +1,6 @@
 //! Looks for what would explain readings that do not belong to the patterns they are said to be of.
 
-use super::explanation::{Explanation, MOST_READINGS};
+use super::explanation::Explanation;
 use super::{HeldBack, Method, MethodSettings};
 use crate::law::robust::median;
 use crate::{Measurements, Order, Rows, Side};
@@ -84,7 +84,7 @@ type Trial = (Explanation, Vec<u32>, usize);
 
 /// Every shift of a few readings.
 fn shifts(rows: &[u32]) -> impl Iterator<Item = Trial> + '_ {
-    let most = MOST_READINGS.min(rows.len() / 2);
+    let most = Explanation::MOST_READINGS.min(rows.len() / 2);
     let late = (1..=most).map(|by| (Explanation::Shift(by as i32), rows[by..].to_vec(), 0));
     let early = (1..=most).map(|by| {
         let patterns = rows[..rows.len() - by].to_vec();

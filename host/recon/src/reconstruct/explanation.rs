@@ -4,9 +4,6 @@
 use crate::Order;
 use std::fmt;
 
-/// The most readings by which a recording may have begun early or late.
-pub(super) const MOST_READINGS: usize = 3;
-
 /// What would explain readings.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -16,6 +13,11 @@ pub enum Explanation {
     Shift(i32),
     /// The patterns were shown in this order.
     Order(Order),
+}
+
+impl Explanation {
+    /// The most readings by which a recording may have begun early or late.
+    pub const MOST_READINGS: usize = 3;
 }
 
 impl fmt::Display for Explanation {

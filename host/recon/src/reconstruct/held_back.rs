@@ -69,7 +69,8 @@ impl HeldBack {
 
     /// Judges predictions of measurements by any patterns, all of which count alike: each measurement with its prediction.
     /// `None` if there are no measurements, or all are 0.
-    pub(super) fn of_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
+    #[must_use]
+    pub fn of_pairs(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Self> {
         let (mut miss, mut zero, mut signs) = (Miss::default(), Miss::default(), Signs::default());
         for (value, predicted) in pairs {
             miss.add(Miss::of(value - predicted));

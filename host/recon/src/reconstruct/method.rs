@@ -197,8 +197,7 @@ impl Method {
         self.0.takes.contains(&setting)
     }
 
-    /// The method for a user's own patterns instead of Hadamard rows
-    /// ([`OwnMatrix`](super::OwnMatrix)), if there is one.
+    /// The method for a user's own patterns instead of Hadamard rows (`nirspi-own`), if there is one.
     #[must_use]
     pub fn with_matrix(self) -> Option<MatrixMethod> {
         self.0.with_matrix

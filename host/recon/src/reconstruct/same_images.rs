@@ -9,7 +9,6 @@
 //! fixed weights, whose squares add up to 1; the last is the image's norm. Sums are compared to
 //! 1/20 000 of the norm, other numbers to 1/2000 of their own size and to 1e-6.
 
-mod matrix;
 mod omp;
 mod penalties;
 mod video;

@@ -1,8 +1,8 @@
 //! Records a feed: the live readings of any bench.
 
 use super::{Seconds, StopCause};
+use nirspi_feed::{Account, Address, End, Feed, Mean, Next, Recorder};
 use nirspi_files::FileError;
-use nirspi_files::feed::{Account, Address, End, Feed, Mean, Next, Recorder};
 use nirspi_recon::words::{count, count_of};
 use serde::Serialize;
 use std::ops::ControlFlow;

@@ -1,12 +1,12 @@
 //! Feeds: the live readings of any bench.
 
 use crate::{Law, MIB, read};
-use nirspi::files::feed::{Account, Frames, Header};
+use nirspi::feed::{Account, Frames, Header};
 
 pub const LAWS: &[Law] = &[Law {
     name: "feeds",
     reads: "a feed: a header of JSON, then numbers as text or bytes",
-    readers: &["host/files/src/feed/header.rs", "host/files/src/feed/frames.rs"],
+    readers: &["host/feed/src/header.rs", "host/feed/src/frames.rs"],
     holds: feeds,
     seeds,
     longest: 2048,

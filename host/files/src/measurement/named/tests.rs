@@ -2,7 +2,8 @@ use super::*;
 use crate::measurement::{PatternSelection, Selection};
 use crate::measurement::{Plain, read_plain};
 use crate::testing::{Zip, file, noise, npy, npy_f64, zip};
-use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings, OwnMatrix};
+use nirspi_own::OwnMatrix;
+use nirspi_recon::reconstruct::{MatrixMethod, MatrixSettings};
 use std::f64::consts::TAU;
 
 fn size(height: usize, width: usize) -> Size {
