@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use super::made;
 use nirspi::account::LossCounters;
 use nirspi::causes::in_one_line;
 use nirspi::identity::CameraIdentity;
@@ -10,18 +11,10 @@ use nirspi::recording::{
 };
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
-use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::samples::{Samples, Width};
-use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode};
 use std::path::{Path, PathBuf};
 
 const RUN: u16 = 3;
 const FRAMES: u32 = 150;
-
-fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
-    let mut buffer = vec![0; MAX_DEVICE_PACKET + 1];
-    encode(message, &mut buffer).unwrap().to_vec()
-}
 
 /// A whole recording of 150 frames of 51 patterns.
 fn recorded(folder: &Path) -> PathBuf {
@@ -35,27 +28,11 @@ fn recorded(folder: &Path) -> PathBuf {
     let opening = Opening::of(&identity, &setup, RUN);
     let mut recorder = Recorder::create(&target, &opening).unwrap();
     for sequence in 0..FRAMES {
-        let mut buffer = vec![0; 4 * setup.rows.len()];
-        let values = (0..setup.rows.len() as i32).map(|k| i64::from(k * 77 - sequence as i32 * 13));
-        let frame = Frame {
-            run: RUN,
-            sequence,
-            device_time_us: u64::from(sequence) * 82,
-            sweeps: 1,
-            flags: FrameFlags::DIFFERENTIAL,
-            samples: Samples::pack(values, Width::Bits32, &mut buffer).unwrap(),
-        };
-        recorder.packet(&packet(&DeviceMessage::Frame(frame))).unwrap();
+        let values = (0..setup.rows.len() as i64).map(|k| k * 77 - i64::from(sequence) * 13);
+        let frame = made::frame(RUN, sequence, u64::from(sequence) * 82, values.collect());
+        recorder.packet(&frame).unwrap();
     }
-    let kind = EventKind::RunEnded {
-        run: RUN,
-        frames_made: FRAMES,
-        frames_dropped: 0,
-        fpga_frames_lost: 0,
-        fpga_frames_corrupt: 0,
-    };
-    let event = Event { device_time_us: 12_300, kind };
-    recorder.packet(&packet(&DeviceMessage::Event(event))).unwrap();
+    recorder.packet(&made::ended(RUN, FRAMES, 12_300)).unwrap();
     let counters = LossCounters { received: FRAMES.into(), ..Default::default() };
     let made = Some(FRAMES.into());
     let account = RunAccount { counters, asked: Some(FRAMES), made, ..RunAccount::default() };

@@ -6,6 +6,7 @@ mod damaged_recordings;
 mod export;
 mod exported_frames;
 mod glossary;
+mod made;
 mod recordings;
 mod replay;
 mod session;

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use super::made;
 use nirspi::address::CameraAddress;
 use nirspi::capture::{Calibration, Capture, CaptureOptions, Ended, Record, StopCause, capture};
 use nirspi::identity::CameraIdentity;
@@ -10,9 +11,8 @@ use nirspi::recording::{Opening, Recorder, Recording, RunAccount, Target, tally_
 use nirspi::session::Session;
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
-use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::samples::{Samples, Width, Words};
-use nirspi_wire::{Depth, DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open};
+use nirspi_wire::samples::Words;
+use nirspi_wire::{Depth, DeviceMessage};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -22,22 +22,9 @@ const FRAMES: u32 = 20;
 /// Time of the camera between two frames.
 const FRAME_US: u64 = 10_000;
 
-fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
-    let mut buffer = vec![0; MAX_DEVICE_PACKET + 1];
-    encode(message, &mut buffer).unwrap().to_vec()
-}
-
 fn frame(sequence: u32, patterns: usize) -> Vec<u8> {
-    let mut buffer = vec![0; 4 * patterns];
-    let values = (0..patterns as i32).map(|k| i64::from(sequence) * 1000 - 7 * i64::from(k));
-    packet(&DeviceMessage::Frame(Frame {
-        run: RUN,
-        sequence,
-        device_time_us: 5_000_000 + u64::from(sequence) * FRAME_US,
-        sweeps: 1,
-        flags: FrameFlags::DIFFERENTIAL,
-        samples: Samples::pack(values, Width::Bits32, &mut buffer).unwrap(),
-    }))
+    let values = (0..patterns as i64).map(|k| i64::from(sequence) * 1000 - 7 * k);
+    made::frame(RUN, sequence, 5_000_000 + u64::from(sequence) * FRAME_US, values.collect())
 }
 
 /// A recording of 20 frames with a depth map, a frame that came damaged, a packet that was too
@@ -62,7 +49,7 @@ fn recorded(folder: &Path, is_whole: bool) -> PathBuf {
                 let mut buffer = [0; 128];
                 let zones = Words::pack((0..64u16).map(|zone| 300 + zone), &mut buffer).unwrap();
                 let depth = Depth { device_time_us: 5_051_000, side: 8, distances_mm: zones };
-                recorder.packet(&packet(&DeviceMessage::Depth(depth))).unwrap();
+                recorder.packet(&made::packet(&DeviceMessage::Depth(depth))).unwrap();
             }
             8 => recorder.packet(&[0]).unwrap(),
             _ => {}
@@ -70,15 +57,7 @@ fn recorded(folder: &Path, is_whole: bool) -> PathBuf {
         recorder.packet(&bytes).unwrap();
     }
     if is_whole {
-        let kind = EventKind::RunEnded {
-            run: RUN,
-            frames_made: FRAMES,
-            frames_dropped: 0,
-            fpga_frames_lost: 0,
-            fpga_frames_corrupt: 0,
-        };
-        let event = Event { device_time_us: 5_200_000, kind };
-        recorder.packet(&packet(&DeviceMessage::Event(event))).unwrap();
+        recorder.packet(&made::ended(RUN, FRAMES, 5_200_000)).unwrap();
     }
     recorder.finish(&RunAccount::default()).unwrap();
     path
@@ -99,16 +78,6 @@ fn replay(path: &Path, speed: &str, frames: Option<u32>, record: Option<&Path>) 
         }),
     };
     capture(&mut session, &options, &mut |_| ControlFlow::Continue(())).unwrap()
-}
-
-/// The packets of a recording that are not replies.
-fn packets(path: &Path) -> Vec<Vec<u8>> {
-    let all = Recording::open(path).unwrap().map(|packet| packet.unwrap().bytes);
-    let is_reply = |bytes: &Vec<u8>| {
-        let mut scratch = bytes[..bytes.len() - 1].to_vec();
-        matches!(open(&mut scratch), Ok(DeviceMessage::Reply(_)))
-    };
-    all.filter(|bytes| !is_reply(bytes)).collect()
 }
 
 /// Another reader of MCAP finds each channel's messages numbered from 0 on, and in the order of their times.
@@ -137,7 +106,7 @@ fn a_capture_of_a_replay_has_the_packets_of_the_recording() {
             let copy = folder.path().join(format!("{name}{at}.mcap"));
             let captured = replay(&path, ",max", asked, Some(&copy));
             assert!(matches!(captured.ended, Ended::Complete), "{:?}", captured.ended);
-            assert!(packets(&copy) == packets(&path), "{name}: other packets");
+            assert!(made::bytes(&copy) == made::bytes(&path), "{name}: other packets");
             let (mut copy, mut first) =
                 (Recording::open(&copy).unwrap(), Recording::open(&path).unwrap());
             assert_eq!(

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use super::made;
 use nirspi::capture::{Calibration, Capture, CaptureError, CaptureOptions, Record, capture};
 use nirspi::link::{Link, Received};
 use nirspi::provenance::Made;
@@ -10,12 +11,9 @@ use nirspi::replay::ReplayLink;
 use nirspi::session::{IgnorePackets, Session, SessionError, request};
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
-use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::samples::Width;
 use nirspi_wire::{
-    Answer, Capabilities, Command, Configuration, DeviceMessage, Event, EventKind, Frame,
-    FrameFlags, Identity, Refusal, Reply, Request, RunLength, Samples, State, Status, Version,
-    encode, open, version,
+    Answer, Capabilities, Command, Configuration, DeviceMessage, Identity, Refusal, Reply, Request,
+    RunLength, State, Status, Version, open, version,
 };
 use std::io;
 use std::ops::{ControlFlow, Range};
@@ -49,9 +47,8 @@ impl Link for OneAtATime {
         }
         let (id, answer) = self.0.remove(0);
         let reply = DeviceMessage::Reply(Reply { id, outcome: Ok(answer) });
-        let mut room = [0; MAX_DEVICE_PACKET];
-        let packet = encode(&reply, &mut room).map_err(io::Error::other)?;
-        buffer[..packet.len()].copy_from_slice(packet);
+        let packet = made::packet(&reply);
+        buffer[..packet.len()].copy_from_slice(&packet);
         Ok(Received::Bytes(packet.len()))
     }
 }
@@ -98,37 +95,19 @@ fn status(state: State, run: u16, frames_made: u32) -> Answer<'static> {
 struct Waiting(Vec<u8>);
 
 impl Waiting {
-    fn message(&mut self, message: &DeviceMessage<'_>) {
-        self.0.extend(encode(message, &mut [0; MAX_DEVICE_PACKET]).unwrap());
-    }
-
     fn reply(&mut self, id: u16, outcome: Result<Answer<'_>, Refusal>) {
-        self.message(&DeviceMessage::Reply(Reply { id, outcome }));
+        self.0.extend(made::packet(&DeviceMessage::Reply(Reply { id, outcome })));
     }
 
     /// Frames of one pattern of run 1.
     fn frames(&mut self, sequences: Range<u32>) {
         for sequence in sequences {
-            self.message(&DeviceMessage::Frame(Frame {
-                run: 1,
-                sequence,
-                device_time_us: 100 * u64::from(sequence),
-                sweeps: 1,
-                flags: FrameFlags::DIFFERENTIAL,
-                samples: Samples::pack([5].into_iter(), Width::Bits32, &mut [0; 4]).unwrap(),
-            }));
+            self.0.extend(made::frame(1, sequence, 100 * u64::from(sequence), vec![5]));
         }
     }
 
     fn ended(&mut self, frames_made: u32) {
-        let kind = EventKind::RunEnded {
-            run: 1,
-            frames_made,
-            frames_dropped: 0,
-            fpga_frames_lost: 0,
-            fpga_frames_corrupt: 0,
-        };
-        self.message(&DeviceMessage::Event(Event { device_time_us: 0, kind }));
+        self.0.extend(made::ended(1, frames_made, 0));
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "what a test cannot set up, it cannot pass")]
 
+use super::made;
 use nirspi::account::LossCounters;
 use nirspi::address::CameraAddress;
 use nirspi::capture::{
@@ -16,9 +17,6 @@ use nirspi::recording::{
 };
 use nirspi::setup::MeasurementSetup;
 use nirspi_recon::Order;
-use nirspi_wire::packet::MAX_DEVICE_PACKET;
-use nirspi_wire::samples::{Samples, Width};
-use nirspi_wire::{DeviceMessage, Event, EventKind, Frame, FrameFlags, encode, open};
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -26,7 +24,7 @@ use std::time::Duration;
 
 const RUN: u16 = 7;
 
-fn made() -> Made {
+fn writer() -> Made {
     Made::by(
         "nirspi 0.1.0",
         Some("0123456789ab"),
@@ -40,11 +38,6 @@ const FRAMES: u32 = 5000;
 const FRAME_US: u64 = 10_000;
 const MEGABYTE: Split = Split::Size(1_000_000);
 
-fn packet(message: &DeviceMessage<'_>) -> Vec<u8> {
-    let mut buffer = vec![0; MAX_DEVICE_PACKET + 1];
-    encode(message, &mut buffer).unwrap().to_vec()
-}
-
 /// A recording of a run. With damage, one frame of three is whole, so that most changes of file would be in
 /// a gap; every 97th frame is lost, and every 83rd is followed by a damaged packet that is no frame.
 fn recorded(path: &Path, frames: u32, is_damaged: bool) {
@@ -55,17 +48,9 @@ fn recorded(path: &Path, frames: u32, is_damaged: bool) {
     let opening = Opening::of(&identity, &setup, RUN);
     let mut recorder = Recorder::create(&target, &opening).unwrap();
     for sequence in 0..frames {
-        let mut buffer = vec![0; 4 * patterns];
-        let values = (0..patterns as i32).map(|k| i64::from(sequence) * 1000 - 7 * i64::from(k));
-        let frame = Frame {
-            run: RUN,
-            sequence,
-            device_time_us: 5_000_000 + u64::from(sequence) * FRAME_US,
-            sweeps: 1,
-            flags: FrameFlags::DIFFERENTIAL,
-            samples: Samples::pack(values, Width::Bits32, &mut buffer).unwrap(),
-        };
-        let mut bytes = packet(&DeviceMessage::Frame(frame));
+        let values = (0..patterns as i64).map(|k| i64::from(sequence) * 1000 - 7 * k).collect();
+        let time = 5_000_000 + u64::from(sequence) * FRAME_US;
+        let mut bytes = made::frame(RUN, sequence, time, values);
         if is_damaged && sequence % 97 == 50 {
             continue;
         }
@@ -77,15 +62,8 @@ fn recorded(path: &Path, frames: u32, is_damaged: bool) {
             recorder.packet(&[1, 2, 3, 0]).unwrap();
         }
     }
-    let kind = EventKind::RunEnded {
-        run: RUN,
-        frames_made: frames,
-        frames_dropped: 0,
-        fpga_frames_lost: 0,
-        fpga_frames_corrupt: 0,
-    };
-    let device_time_us = 5_000_000 + u64::from(frames) * FRAME_US;
-    recorder.packet(&packet(&DeviceMessage::Event(Event { device_time_us, kind }))).unwrap();
+    let time = 5_000_000 + u64::from(frames) * FRAME_US;
+    recorder.packet(&made::ended(RUN, frames, time)).unwrap();
     recorder.finish(&RunAccount::default()).unwrap();
 }
 
@@ -127,20 +105,9 @@ fn capture_of(
         setup,
         frames,
         calibration: Calibration::None,
-        record: record.map(|target| Record { target, made: made() }),
+        record: record.map(|target| Record { target, made: writer() }),
     };
     observe(&mut session, &options, &mut disturbing)
-}
-
-/// The packets of a recording that are not replies, with their times.
-fn packets(path: &Path) -> Vec<(Vec<u8>, u64)> {
-    let all = Recording::open(path).unwrap().map(|packet| packet.unwrap());
-    let is_reply = |bytes: &[u8]| {
-        let mut bytes = bytes.to_vec();
-        bytes.pop();
-        matches!(open(&mut bytes), Ok(DeviceMessage::Reply(_)))
-    };
-    all.filter(|packet| !is_reply(&packet.bytes)).map(|p| (p.bytes, p.time_ns)).collect()
 }
 
 fn names(folder: &Path) -> Vec<String> {
@@ -170,7 +137,7 @@ fn check_files(files: &[PathBuf], captured: &Capture) -> Vec<RunAccount> {
         assert_eq!(account.counters, tally.account().counters(), "{at}");
         assert_eq!(account.continues, files.get(at + 1).map(name), "{at}");
         next = tally.account().accounted();
-        for (_, time) in packets(path) {
+        for (_, time) in made::packets(path) {
             assert!(time >= newest, "the clock of file {at} is another one");
             newest = time;
         }
@@ -199,13 +166,12 @@ fn the_files_of_a_run_have_each_packet_once_and_each_is_a_whole_recording() {
     assert_eq!(captured.recording.as_ref(), files.first());
 
     let accounts = check_files(files, &captured);
-    let bytes = |packets: Vec<(Vec<u8>, u64)>| packets.into_iter().map(|(bytes, _)| bytes);
-    let sent: Vec<Vec<u8>> = bytes(packets(&whole)).collect();
-    let found: Vec<Vec<u8>> = files.iter().flat_map(|path| bytes(packets(path))).collect();
+    let sent = made::bytes(&whole);
+    let found: Vec<Vec<u8>> = files.iter().flat_map(|path| made::bytes(path)).collect();
     assert!(found == sent, "{} packets of {}", found.len(), sent.len());
     // Each file says who wrote it.
     for path in files {
-        assert_eq!(RecordingInfo::read(path).unwrap().written_by, Some(made()));
+        assert_eq!(RecordingInfo::read(path).unwrap().written_by, Some(writer()));
     }
     // Each file says what it lacks itself, and the last one how the run ended.
     for account in &accounts {
@@ -230,7 +196,7 @@ fn the_files_of_a_run_have_each_packet_once_and_each_is_a_whole_recording() {
     let recovered = folder.path().join("recovered.mcap");
     assert_eq!(recover(middle, &recovered, false).unwrap().frames, tally.account().counters());
     let info = RecordingInfo::read(&recovered).unwrap();
-    assert_eq!(info.written_by, Some(made()));
+    assert_eq!(info.written_by, Some(writer()));
     assert_eq!(info.part.as_ref().unwrap().number, 2);
     let info = info.to_string();
     let written = "written by nirspi 0.1.0, 2025-11-25T08:30:00Z: nirspi capture --frames 9";

@@ -131,49 +131,29 @@ fn a_capture_whose_samples_can_leave_24_bits_has_samples_of_32() {
     }
 }
 
-#[test]
-fn a_dropped_frame_is_counted_once_and_fails_the_check() {
-    let judge = only_frames(|frame| if frame == 2 { Fate::Drop } else { Fate::Pass });
-    let link = Tampered::new(ideal_link(), judge);
-    let captured = run(Box::new(link), &options(&Order::Natural, false));
-    assert_eq!((captured.counters.received, captured.counters.lost), (5, 1));
-    assert!(check(&captured).is_err());
+/// Runs a capture whose frame `at` meets `fate`, the others pass.
+fn tampered(at: usize, fate: Fate) -> Capture {
+    let judge = only_frames(move |frame| if frame == at { fate } else { Fate::Pass });
+    run(Box::new(Tampered::new(ideal_link(), judge)), &options(&Order::Natural, false))
 }
 
 #[test]
-fn the_last_frame_dropped_is_counted_too() {
-    let judge = only_frames(|frame| if frame == 5 { Fate::Drop } else { Fate::Pass });
-    let captured =
-        run(Box::new(Tampered::new(ideal_link(), judge)), &options(&Order::Natural, false));
-    assert_eq!((captured.counters.received, captured.counters.lost), (5, 1));
-}
-
-#[test]
-fn a_flipped_bit_anywhere_is_a_corrupt_frame_and_fails_the_check() {
-    for share in [0, 1, 60, 128, 255] {
-        let judge =
-            only_frames(move |frame| if frame == 3 { Fate::Flip(share) } else { Fate::Pass });
-        let link = Tampered::new(ideal_link(), judge);
-        let captured = run(Box::new(link), &options(&Order::Natural, false));
+fn a_frame_that_is_lost_late_or_damaged_is_counted_once_and_fails_the_check() {
+    let flipped = [0, 1, 60, 128, 255].map(|share| (3, Fate::Flip(share), [0, 1, 0]));
+    let others =
+        [(2, Fate::Drop, [1, 0, 0]), (5, Fate::Drop, [1, 0, 0]), (1, Fate::Delay, [0, 0, 1])];
+    for (at, fate, expected) in flipped.into_iter().chain(others) {
+        let captured = tampered(at, fate);
         let counters = captured.counters;
-        assert_eq!((counters.received, counters.corrupt, counters.lost), (5, 1, 0), "{share}");
-        assert!(check(&captured).is_err());
+        assert_eq!(counters.received, 5, "{at} {fate:?}");
+        assert_eq!([counters.lost, counters.corrupt, counters.late], expected, "{at} {fate:?}");
+        assert!(check(&captured).is_err(), "{at} {fate:?}");
     }
 }
 
 #[test]
-fn a_frame_that_is_overtaken_is_late() {
-    let judge = only_frames(|frame| if frame == 1 { Fate::Delay } else { Fate::Pass });
-    let captured =
-        run(Box::new(Tampered::new(ideal_link(), judge)), &options(&Order::Natural, false));
-    assert_eq!((captured.counters.received, captured.counters.late), (5, 1));
-}
-
-#[test]
 fn an_unplugged_link_keeps_what_came_and_says_so() {
-    let judge = only_frames(|frame| if frame == 3 { Fate::Unplug } else { Fate::Pass });
-    let captured =
-        run(Box::new(Tampered::new(ideal_link(), judge)), &options(&Order::Natural, false));
+    let captured = tampered(3, Fate::Unplug);
     assert_eq!(captured.integrated.frames(), 3);
     let Ended::LinkLost(SessionError::Closed { mid_packet: true }) = captured.ended else {
         panic!("{:?}", captured.ended);

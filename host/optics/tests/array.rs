@@ -2,16 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::{Footprint, LEDS, LedArray, Projector, SIDE, Scene};
+use crate::footprint;
+use nirspi_optics::{Footprint, LEDS, LedArray, SIDE};
 use proptest::prelude::*;
 use std::sync::LazyLock;
-
-/// A footprint in which every LED sees something of its own.
-fn footprint() -> Footprint {
-    let pixels = (0..LEDS).map(|i| (i * 7919 % 1000) as f32 / 1000.0).collect();
-    let scene = Scene::new(pixels, SIDE, 48.0).unwrap();
-    Projector::default().footprint(&scene, 300.0).unwrap()
-}
 
 #[test]
 fn nothing_is_lit_unless_enabled() {

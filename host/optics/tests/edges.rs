@@ -2,20 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::{
-    Chain, ChainSettings, Footprint, LEDS, LedArray, LedEdges, Projector, SIDE, Scene,
-};
+use crate::footprint;
+use nirspi_optics::{Chain, ChainSettings, LedArray, LedEdges, SIDE};
 use proptest::prelude::*;
 
 /// Parts of an ADC clock in which the slow simulation advances.
 const PARTS: u32 = 128;
 const CLOCK_NS: f64 = 8.0;
-
-fn footprint() -> Footprint {
-    let pixels = (0..LEDS).map(|i| (i * 7919 % 1000) as f32 / 1000.0).collect();
-    let scene = Scene::new(pixels, SIDE, 48.0).unwrap();
-    Projector::default().footprint(&scene, 300.0).unwrap()
-}
 
 /// One LED.
 #[derive(Clone, Copy)]

@@ -3,8 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+use crate::beams;
 use nirspi_optics::mie::Mie;
-use nirspi_optics::rain::falling::{BeamShadows, FallingDrops};
+use nirspi_optics::rain::falling::FallingDrops;
 use nirspi_optics::rain::{
     BackwardLobe, DropClass, Drops, ForwardBlur, Medium, RainError, ScatteringAngles, Veil,
 };
@@ -377,15 +378,6 @@ fn the_backward_bands_carry_what_the_whole_phase_function_does() {
             .sum();
         let whole = 1.0 - angles(&drops, 1550.0).within(140_f64.to_radians());
         assert!((share / whole - 1.0).abs() < 0.15, "{share} against {whole}");
-    }
-}
-
-fn beams(distance_mm: f64) -> BeamShadows {
-    BeamShadows {
-        projector: Projector::default(),
-        distance_mm,
-        baseline_mm: 40.0,
-        collector_mm: 1.66,
     }
 }
 

@@ -2,19 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
-use nirspi_optics::rain::{Air, BeamShadows, Drops, RainySpots, Weather};
+use crate::beams;
+use nirspi_optics::rain::{Air, Drops, RainySpots, Weather};
 use nirspi_optics::visible::VisibleCamera;
 use nirspi_optics::water::Water;
 use nirspi_optics::{Footprint, LEDS, LedArray, Projector, Scene};
-
-fn beams(distance_mm: f64) -> BeamShadows {
-    BeamShadows {
-        projector: Projector::default(),
-        distance_mm,
-        baseline_mm: 40.0,
-        collector_mm: 1.66,
-    }
-}
 
 fn white(distance_mm: f64) -> Footprint {
     let scene = Scene::new(vec![1.0], 1, 10_000.0).unwrap();

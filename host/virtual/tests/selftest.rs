@@ -226,7 +226,7 @@ fn lines_that_no_sweep_inverts_are_seen_in_the_first_pixel() {
         }
         _ => value,
     };
-    let found = test(plugged(Tampered { inner, told: HashMap::new(), write }));
+    let found = test(plugged(Tampered::new(inner, write)));
     only(&found, "first pixel at 25 MHz", &["pixel (0, 0) -"]);
 }
 
@@ -235,11 +235,18 @@ struct Tampered<W> {
     inner: OpticalFpga,
     told: HashMap<u16, u32>,
     write: W,
+    /// Whether the simulation takes much longer than the time that it simulates.
+    is_busy: Arc<AtomicBool>,
+}
+
+impl<W> Tampered<W> {
+    fn new(inner: OpticalFpga, write: W) -> Self {
+        Self { inner, told: HashMap::new(), write, is_busy: Arc::default() }
+    }
 }
 
 fn tampered(write: impl FnMut(Register, u32) -> u32 + Send + 'static) -> SelfTest {
-    let inner = optics().fpga(1).unwrap();
-    test(plugged(Tampered { inner, told: HashMap::new(), write }))
+    test(plugged(Tampered::new(optics().fpga(1).unwrap(), write)))
 }
 
 impl<W: FnMut(Register, u32) -> u32 + Send> FpgaBus for Tampered<W> {
@@ -272,6 +279,10 @@ impl<W: FnMut(Register, u32) -> u32 + Send> FpgaBus for Tampered<W> {
 
 impl<W: FnMut(Register, u32) -> u32 + Send> SimulatedFpga for Tampered<W> {
     fn advance(&mut self, clocks: u32) {
+        if self.is_busy.load(Ordering::Relaxed) {
+            // 25 ms for a sweep of 0.08 ms.
+            std::thread::sleep(Duration::from_micros(u64::from(clocks) * 5 / 2));
+        }
         self.inner.advance(clocks);
     }
     fn clock(&self) -> u64 {
@@ -388,61 +399,13 @@ fn a_link_that_loses_frames_is_seen_and_the_camera_is_not_blamed() {
     );
 }
 
-/// An FPGA on a busy computer: its simulation takes much longer than the time that it simulates.
-struct Busy {
-    inner: OpticalFpga,
-    is_busy: Arc<AtomicBool>,
-}
-
-impl FpgaBus for Busy {
-    fn read(&mut self, address: u16) -> Result<u32, BusError> {
-        self.inner.read(address)
-    }
-    fn write(&mut self, address: u16, value: u32) -> Result<(), BusError> {
-        self.inner.write(address, value)
-    }
-    fn frame_ready(&mut self) -> bool {
-        self.inner.frame_ready()
-    }
-    fn raw_ready(&mut self) -> bool {
-        self.inner.raw_ready()
-    }
-    fn frame(&mut self) -> Result<Option<&[u8]>, BusError> {
-        self.inner.frame()
-    }
-    fn raw(&mut self) -> Result<Option<&[u8]>, BusError> {
-        self.inner.raw()
-    }
-}
-
-impl SimulatedFpga for Busy {
-    fn advance(&mut self, clocks: u32) {
-        if self.is_busy.load(Ordering::Relaxed) {
-            // 25 ms for a sweep of 0.08 ms.
-            std::thread::sleep(Duration::from_micros(u64::from(clocks) * 5 / 2));
-        }
-        self.inner.advance(clocks);
-    }
-    fn clock(&self) -> u64 {
-        self.inner.clock()
-    }
-    fn running(&self) -> bool {
-        self.inner.running()
-    }
-    fn set_interlock(&mut self, closed: bool) {
-        self.inner.set_interlock(closed);
-    }
-    fn set_board_enable(&mut self, high: bool) {
-        self.inner.set_board_enable(high);
-    }
-}
-
 /// Once the pace came from the clock of this computer: frames of the second run then took minutes, no frame
 /// came, and a sound camera failed.
 #[test]
 fn a_busy_computer_is_no_fault_of_the_link() {
     let is_busy = Arc::new(AtomicBool::new(false));
-    let fpga = Busy { inner: optics().fpga(1).unwrap(), is_busy: Arc::clone(&is_busy) };
+    let mut fpga = Tampered::new(optics().fpga(1).unwrap(), |_, value| value);
+    fpga.is_busy = Arc::clone(&is_busy);
     let mut session = Session::open(Box::new(plugged(fpga))).unwrap();
     let demands = LinkDemands { min_frames_per_s: 0.0, duration: Duration::from_millis(50) };
     let mut begin = |stage| is_busy.store(STAGES[stage] == "link throughput", Ordering::Relaxed);

@@ -3,7 +3,7 @@
 
 use super::fake_ecp5::{FakeEcp5, Illness};
 use crate::ecp5::{Configuration, ConfigureError, IDCODE_LFE5UM5G_85F, PIECE_BYTES, must_load};
-use crate::staging::{StagingLoader, stored};
+use crate::staging::StagingLoader;
 use crate::{BusError, GatewareLoader, LoadError, Micros};
 use nirspi_wire::crc32;
 use std::vec;
@@ -174,19 +174,4 @@ fn a_failure_is_told_once_and_nothing_is_known_to_run() {
     assert_eq!(loader.running(), None);
     assert!(matches!(loader.take_failure(), Some(ConfigureError::Refused { .. })));
     assert_eq!(loader.take_failure(), None);
-}
-
-#[test]
-fn a_stored_bitstream_is_found_with_the_clocks_that_it_ends_with() {
-    let mut region = vec![0xFF; 10_000];
-    assert_eq!(stored(&region), None, "erased");
-    let written = bitstream(3_000);
-    region[..3_000].copy_from_slice(&written);
-    let found = stored(&region).unwrap();
-    assert!(found.starts_with(&written) && found[3_000..].iter().all(|&byte| byte == 0xFF));
-    assert!((3_016..3_100).contains(&found.len()));
-    assert_eq!(stored(&written), Some(&*written), "no room after it");
-    region[1] = 0x12;
-    assert_eq!(stored(&region), None, "something else is there");
-    assert_eq!(stored(&[]), None);
 }

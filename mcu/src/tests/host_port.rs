@@ -344,32 +344,6 @@ impl Device {
     }
 }
 
-#[test]
-fn the_camera_streams_over_the_port_and_counts_what_could_not_be_read() {
-    let mut device = Device::new(bus());
-    device.ask(Command::Configure(SMALL));
-    device.ask(Command::Start(RunLength::Frames(5)));
-    let mut heard = Vec::new();
-    for number in 0..5 {
-        device.bus.port().failures = if number == 2 { 3 } else { 0 };
-        device.bus.port().fpga.make_frame();
-        for _ in 0..6 {
-            device.turn(&[]);
-        }
-        heard.extend(device.heard());
-    }
-    let sequences: Vec<u32> = frames(&heard).iter().map(|frame| frame.sequence).collect();
-    assert_eq!(sequences, [0, 1, 3, 4]);
-    let ended = EventKind::RunEnded {
-        run: 1,
-        frames_made: 5,
-        frames_dropped: 0,
-        fpga_frames_lost: 0,
-        fpga_frames_corrupt: 1,
-    };
-    assert_eq!(events(&heard), [ended]);
-}
-
 /// Until the FPGA takes the release, its line still signals the frame that was read before.
 #[test]
 fn a_frame_is_read_once_however_long_its_release_does_not_come_through() {

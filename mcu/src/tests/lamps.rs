@@ -79,30 +79,20 @@ fn the_ready_lamp_blinks_until_a_host_has_come() {
     assert_eq!(states(&Bench::open()), [true; 8]);
 }
 
-#[test]
-fn the_light_lamp_is_on_while_the_fpga_may_light_leds() {
-    let mut bench = Bench::open();
-    let lamp = |bench: &Bench| bench.camera.lamps(bench.now).light;
-    assert!(!lamp(&bench));
-    bench.ask(Command::Configure(SMALL)).unwrap();
-    assert!(!lamp(&bench), "configured, and dark");
-    bench.ask(Command::Start(RunLength::Continuous)).unwrap();
-    assert!(bench.fpga.leds_on() && lamp(&bench));
-    bench.inputs.interlock_closed = false;
-    bench.poll();
-    assert!(!bench.fpga.leds_on() && !lamp(&bench), "dark, and the run's last frames still come");
-}
-
 /// The board drives the pin, and the FPGA cannot light LEDs while the pin is low.
 #[test]
-fn the_led_pin_may_be_high_from_the_configuration_until_a_fault() {
+fn the_light_lamp_is_on_in_light_and_the_led_pin_may_be_high_from_the_configuration_until_a_fault()
+{
     let mut bench = Bench::open();
-    assert!(!bench.camera.may_light());
+    let seen = |bench: &Bench| {
+        (bench.fpga.leds_on(), bench.camera.lamps(bench.now).light, bench.camera.may_light())
+    };
+    assert_eq!(seen(&bench), (false, false, false));
     bench.ask(Command::Configure(SMALL)).unwrap();
-    assert!(bench.camera.may_light());
+    assert_eq!(seen(&bench), (false, false, true), "configured, and dark");
     bench.ask(Command::Start(RunLength::Continuous)).unwrap();
-    assert!(bench.camera.may_light());
+    assert_eq!(seen(&bench), (true, true, true));
     bench.inputs.interlock_closed = false;
     bench.poll();
-    assert!(!bench.camera.may_light());
+    assert_eq!(seen(&bench), (false, false, false), "and the run's last frames still come");
 }

@@ -2,7 +2,7 @@
 
 use super::support::*;
 use nirspi_wire::packet::encode;
-use nirspi_wire::{Answer, Command, DeviceMessage, Refusal, State, version};
+use nirspi_wire::{DeviceMessage, Refusal, State, version};
 use std::vec::Vec;
 
 /// A whole packet with this payload.
@@ -43,13 +43,4 @@ fn before_hello_an_unknown_command_is_told_the_version() {
     let refused = Err(Refusal::Protocol { device: version::CURRENT });
     assert!(matches!(bench.heard()[..], [DeviceMessage::Reply(reply)]
         if reply.id == 7 && reply.outcome == refused));
-}
-
-#[test]
-fn a_host_greets_again_with_the_cameras_version() {
-    let mut bench = Bench::new();
-    let newer = bench.ask(Command::Hello { protocol: version::CURRENT + 1 });
-    assert!(matches!(newer, Ok(Answer::Hello(identity)) if identity.protocol == version::CURRENT));
-    assert!(bench.ask(Command::Hello { protocol: version::CURRENT }).is_ok());
-    bench.status();
 }

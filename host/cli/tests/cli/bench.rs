@@ -106,6 +106,11 @@ impl Bench {
         Process { child, out, err, command: arguments.join(" ") }
     }
 
+    /// Runs `nirspi` with these words, parted by blanks, in the folder, to its end.
+    pub fn run_line(&self, line: &str) -> Outcome {
+        self.run(&line.split_whitespace().collect::<Vec<_>>())
+    }
+
     /// Runs `nirspi` with these arguments, in the folder, to its end.
     pub fn run(&self, arguments: &[&str]) -> Outcome {
         self.start(arguments).wait()
@@ -284,6 +289,14 @@ pub fn npz(fields: &[(&str, &[usize], &[f32])]) -> Vec<u8> {
     archive.finish().unwrap().into_inner()
 }
 
+/// The bytes of an array of a `.npz` file, behind its header.
+pub fn array(path: &Path, name: &str) -> Vec<u8> {
+    let mut archive = zip::ZipArchive::new(File::open(path).unwrap()).unwrap();
+    let mut bytes = Vec::new();
+    archive.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+    bytes.split_off(10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]])))
+}
+
 /// A measured scene: what a test knows of it, and the fields of its measurement file.
 pub struct Measured {
     pub n: usize,
@@ -346,6 +359,22 @@ impl Measured {
     pub fn npz(&self) -> Vec<u8> {
         self.npz_with("recon", Some((&[self.n, self.n], &self.image)))
     }
+}
+
+/// Weights of 0 and 1 that look random and are the same in each run.
+pub fn bits(count: usize) -> Vec<f32> {
+    let mut state = 1_u32;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 31) as f32
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+/// What each pattern sees of a scene.
+pub fn seen(weights: &[f32], scene: &[f32]) -> Vec<f32> {
+    let see = |pattern: &[f32]| pattern.iter().zip(scene).map(|(w, v)| w * v).sum();
+    weights.chunks_exact(scene.len()).map(see).collect()
 }
 
 /// Pearson's correlation.

@@ -74,19 +74,8 @@ fn mistakes_in_a_description_are_told_in_one_line() {
 #[ignore = "long: .ci/run demo"]
 fn the_one_metre_camera_shows_a_letter_at_one_metre_in_heavy_rain() {
     let bench = Bench::new();
-    let demo = [
-        "demo",
-        "--camera-model",
-        "one-metre",
-        "--scene",
-        "letter:R",
-        "--distance-m",
-        "1",
-        "--rain",
-        "heavy",
-        "--json",
-    ];
-    let report = bench.run(&demo).succeeded().json();
+    let demo = "demo --camera-model one-metre --scene letter:R --distance-m 1 --rain heavy --json";
+    let report = bench.run_line(demo).succeeded().json();
     assert!(report["acquisition_ms"].as_f64().unwrap() <= 100.0, "{report}");
     let quality = &report["reconstruction"];
     assert!(quality["psnr_db"].as_f64().unwrap() >= 24.0, "{quality}");

@@ -276,15 +276,6 @@ fn a_fault_whose_event_came_damaged_is_found_in_the_status() {
 }
 
 #[test]
-fn a_camera_that_sends_more_than_was_asked_for_is_stopped() {
-    let run = Run { frames: 80, says: Some(80), ..HONEST };
-    let bench = Bench::new();
-    let outcome = capture(&bench, &camera(run, || {}), &[]);
-    let report = outcome.failed(1, &["frames, 50 were asked for"]).json();
-    assert_eq!(report["complete"], false, "{report}");
-}
-
-#[test]
 fn nothing_but_damaged_packets_neither_succeeds_nor_fills_the_disk() {
     let run = Run { frames: 0, says: None, flood: Some(Flood::Damaged), ..HONEST };
     let report = incomplete(run, 0, &["66 MB of damaged packets and packets of other runs"]);

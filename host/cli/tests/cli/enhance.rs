@@ -3,6 +3,7 @@
 use crate::bench::{Bench, provenance};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
+use nirspi_nets::weights::Precision;
 use std::ops::Range;
 
 /// A blurred bar on `side` x `side` pixels, brightness from 0 to 1.
@@ -20,30 +21,9 @@ fn a_stack_comes_out_at_64_pixels_with_its_estimates_and_its_inconsistency() {
     bench.write("in.npy", &npy::encode(&[2, 32, 32], &[bar(32), bar(32)].concat()));
     let zones: Vec<f32> = (0..64).map(|i| if i % 3 == 0 { f32::NAN } else { 0.6 }).collect();
     bench.write("tof.npy", &npy::encode(&[8, 8], &zones));
-    let report = bench
-        .run(&[
-            "enhance",
-            "in.npy",
-            "--depth",
-            "tof.npy",
-            "--spread",
-            "spread.npy",
-            "--interval",
-            "interval.npy",
-            "--method",
-            "tikhonov",
-            "--sampling",
-            "1",
-            "--readings-noise",
-            "0.01",
-            "--out",
-            "out.npy",
-            "--backend",
-            "cpu",
-            "--json",
-        ])
-        .succeeded()
-        .json();
+    let line = "enhance in.npy --depth tof.npy --spread spread.npy --interval interval.npy --method tikhonov \
+                --sampling 1 --readings-noise 0.01 --out out.npy --backend cpu --json";
+    let report = bench.run_line(line).succeeded().json();
     let stack = npy::read_stack(&bench.path("out.npy")).unwrap();
     assert_eq!((stack.count, stack.height, stack.width), (2, 64, 64));
     assert!(stack.values.iter().all(|v| (0.0..=1.0).contains(v)));
@@ -166,27 +146,14 @@ fn what_is_no_image_for_the_networks_gets_one_line_and_nothing_is_written() {
     bench
         .run(&["enhance", "good.npy", "--weights", "text.npy", "--out", "out.npy"])
         .failed(1, &["text.npy", "safetensors"]);
-    assert_eq!(bench.names(), files);
-}
-
-#[test]
-fn weights_of_another_network_are_refused() {
-    let bench = Bench::new();
-    bench.write("in.npy", &npy::encode(&[32, 32], &bar(32)));
-    let classifier = nirspi_nets::Weights::embedded("classifier").unwrap();
-    let classifier = classifier.to_bytes(nirspi_nets::weights::Precision::Half).unwrap();
-    bench.write("classifier.safetensors", &classifier);
+    let other = nirspi_nets::Weights::embedded("classifier").unwrap();
+    bench.write("other.safetensors", &other.to_bytes(Precision::Half).unwrap());
+    let upscale = ["dev", "upscale", "good.npy", "--out", "out.npy"];
     bench
-        .run(&[
-            "dev",
-            "upscale",
-            "in.npy",
-            "--weights",
-            "classifier.safetensors",
-            "--out",
-            "out.npy",
-        ])
-        .failed(2, &["classifier.safetensors", "network classifier", "expected fsrcnn"]);
+        .run(&[&upscale[..], &["--weights", "other.safetensors"]].concat())
+        .failed(2, &["other.safetensors", "network classifier", "expected fsrcnn"]);
+    std::fs::remove_file(bench.path("other.safetensors")).unwrap();
+    assert_eq!(bench.names(), files);
 }
 
 #[test]

@@ -82,17 +82,8 @@ fn quiet_leaves_out_notes_and_one_is_no_plural() {
     assert!(said.contains("1 atom of the dct basis"), "{said}");
     let quiet = bench.run(&[&command[..], &["-q"]].concat()).succeeded().stdout;
     assert!(!quiet.contains("note: ") && quiet.contains("1 atom of the dct basis"), "{quiet}");
-    let third = [
-        "reconstruct",
-        "in.npz",
-        "--non-differential",
-        "--sampling",
-        "30%",
-        "--method",
-        "tikhonov",
-        "--strength",
-        "0.3",
-    ];
-    let said = bench.run(&third).succeeded().stdout;
+    let third =
+        "reconstruct in.npz --non-differential --sampling 30% --method tikhonov --strength 0.3";
+    let said = bench.run_line(third).succeeded().stdout;
     assert!(said.contains(", strength 0.3, "), "{said}");
 }

@@ -58,7 +58,7 @@ fn replying(reply: impl Fn(u16, &mut [u8]) -> Vec<u8> + Send + 'static) -> Strin
 }
 
 #[test]
-fn a_camera_of_a_future_protocol_is_told_apart_with_both_versions() {
+fn what_answers_as_no_camera_of_this_version_is_refused_in_words() {
     let identity = || {
         Ok(Answer::Hello(Identity {
             protocol: 99,
@@ -73,32 +73,25 @@ fn a_camera_of_a_future_protocol_is_told_apart_with_both_versions() {
             capabilities: Capabilities::default(),
         }))
     };
-    let words = ["protocol version 99", "this program version 1:", "update this program"];
-    refused(&answering(identity), &words);
-    refused(&answering(|| Err(Refusal::Protocol { device: 99 })), &words);
-}
-
-#[test]
-fn a_greeting_that_says_more_than_ours_still_names_its_version() {
+    let future = ["protocol version 99", "this program version 1:", "update this program"];
+    refused(&answering(identity), &future);
+    refused(&answering(|| Err(Refusal::Protocol { device: 99 })), &future);
     // DeviceMessage::Reply, the number, Ok, Answer::Hello, the version; then fields that nobody knows yet.
     let greeting = |id, packet: &mut [u8]| {
         encode(&(0u8, id, 0u8, 0u8, 99u16, [0xA5u8; 31]), packet).unwrap().to_vec()
     };
-    refused(
-        &replying(greeting),
-        &["protocol version 99", "this program version 1:", "update this program"],
-    );
-}
-
-#[test]
-fn a_camera_of_the_past_is_to_be_updated() {
-    let words = ["protocol version 0", "this program version 1:", "update the camera's firmware"];
-    refused(&answering(|| Err(Refusal::Protocol { device: 0 })), &words);
-}
-
-#[test]
-fn a_refusal_is_told_in_words() {
+    refused(&replying(greeting), &future);
+    let past = ["protocol version 0", "this program version 1:", "update the camera's firmware"];
+    refused(&answering(|| Err(Refusal::Protocol { device: 0 })), &past);
     refused(&answering(|| Err(Refusal::Bus)), &["refused Hello", "FPGA does not answer"]);
+    let web = device(|mut host| {
+        let _ = host.read(&mut [0; 1000]);
+        let _ = host.write_all(b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n");
+    });
+    refused(&web, &["closed the link"]);
+    refused(&device(drop), &["link closed before the camera answered", "another program"]);
+    let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    refused(&format!("tcp:{free}"), &["no camera at", "refused"]);
 }
 
 #[test]
@@ -121,24 +114,4 @@ fn a_device_that_talks_nonsense_is_given_up() {
         while host.write_all(&bytes).is_ok() {}
     });
     refused(&noise, &["no answer to Hello within 5 s"]);
-}
-
-#[test]
-fn a_web_server_is_no_camera() {
-    let server = device(|mut host| {
-        let _ = host.read(&mut [0; 1000]);
-        let _ = host.write_all(b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n");
-    });
-    refused(&server, &["closed the link"]);
-}
-
-#[test]
-fn a_device_that_hangs_up_is_no_camera() {
-    refused(&device(drop), &["link closed before the camera answered", "another program"]);
-}
-
-#[test]
-fn nobody_listening_is_no_camera() {
-    let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    refused(&format!("tcp:{free}"), &["no camera at", "refused"]);
 }

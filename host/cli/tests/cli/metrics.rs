@@ -15,6 +15,9 @@ fn two_stacks_are_compared_image_by_image() {
     // The first is identical, which has no finite PSNR; the second is off by 0.05 everywhere: 26.02 dB.
     assert!(report["each"][0]["psnr_db"].is_null() && report["each"][0]["ssim"] == 1.0, "{report}");
     assert!((report["each"][1]["psnr_db"].as_f64().unwrap() - 26.0206).abs() < 1e-3, "{report}");
+    let twice = ["metrics", "a.npy", "b.npy", "--json", "--data-range", "2"];
+    let psnr_db = &bench.run(&twice).succeeded().json()["each"][1]["psnr_db"];
+    assert!((psnr_db.as_f64().unwrap() - 32.0412).abs() < 1e-3, "{psnr_db}");
     let said = bench.run(&["metrics", "a.npy", "b.npy"]).succeeded().stdout;
     assert!(said.starts_with("2 images of 16 x 16\nPSNR 26.02 dB, SSIM 0.9"), "{said}");
 }

@@ -1,7 +1,7 @@
 //! Options that no other test of the program looks at, in groups by their commands: each changes what comes out, as its help
 //! says.
 
-use crate::bench::{Bench, Measured, npz, provenance};
+use crate::bench::{Bench, array, npz, provenance};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 use serde_json::Value;
@@ -27,60 +27,6 @@ fn are_close(found: &[f32], expected: &[f32]) {
     assert_eq!(found.len(), expected.len());
     let worst = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0_f32, f32::max);
     assert!(worst < 1e-3, "pixels differ by {worst}");
-}
-
-#[test]
-fn a_file_of_measurements_is_read_as_its_options_say() {
-    let (bench, measured) = (Bench::new(), Measured::new(8));
-    bench.write("plain.npz", &measured.npz());
-    let whole = image(&bench, "plain.npz", &[]);
-
-    // Another name for the readings.
-    let (n, rows) = ([8.0], [64]);
-    let named: [(&str, &[usize], &[f32]); 3] =
-        [("n", &[], &n), ("h_row", &rows, &measured.h_row), ("volts", &[128], &measured.y)];
-    bench.write("named.npz", &npz(&named));
-    bench.run(&["reconstruct", "named.npz"]).failed(1, &["`volts`"]);
-    are_close(&image(&bench, "named.npz", &["--field", "volts"]), &whole);
-
-    // Two measurements, the patterns along the first axis.
-    let both: Vec<f32> = measured.d.iter().flat_map(|d| [*d, 3.0 * d]).collect();
-    bench.write("first.npz", &measured.npz_with("y", Some((&[64, 2], &both))));
-    let second = ["--readings", "differences", "--index", "1"];
-    bench
-        .run(&[&["reconstruct", "first.npz"], &second[..]].concat())
-        .failed(1, &["--patterns-first"]);
-    let found = image(&bench, "first.npz", &[&second[..], &["--patterns-first"]].concat());
-    are_close(&found, &whole.iter().map(|pixel| 3.0 * pixel).collect::<Vec<_>>());
-
-    // A part of a sweep does not say the image's side, and differences do not say that they are differences.
-    let in_order: Vec<f32> = (0..40)
-        .map(|row| measured.d[measured.h_row.iter().position(|&is| is == row as f32).unwrap()])
-        .collect();
-    bench.write("part.npy", &npy::encode(&[40], &in_order));
-    let part = ["--shown", "natural", "--readings", "differences"];
-    bench.run(&[&["reconstruct", "part.npy"], &part[..]].concat()).failed(1, &["--side"]);
-    let natural: Vec<f32> = (0..40).map(|row| row as f32).collect();
-    let fields: [(&str, &[usize], &[f32]); 3] =
-        [("n", &[], &n), ("h_row", &[40], &natural), ("d", &[40], &in_order)];
-    bench.write("part.npz", &npz(&fields));
-    let found = image(&bench, "part.npy", &[&part[..], &["--side", "8"]].concat());
-    are_close(&found, &image(&bench, "part.npz", &[]));
-}
-
-#[test]
-fn a_comma_is_a_decimal_one_if_the_user_says_so() {
-    let bench = Bench::new();
-    let readings = (0..32).map(|at| (at * 7 % 16, 25 + at)).collect::<Vec<_>>();
-    let text = |mark: char| -> String {
-        readings.iter().map(|(whole, part)| format!("{whole}{mark}{part}\n")).collect()
-    };
-    bench.write("comma.txt", text(',').as_bytes());
-    bench.write("point.txt", text('.').as_bytes());
-    let shown = ["--shown", "natural"];
-    bench.run(&["reconstruct", "comma.txt", "--shown", "natural"]).failed(1, &["--decimal-comma"]);
-    let found = image(&bench, "comma.txt", &["--shown", "natural", "--decimal-comma"]);
-    are_close(&found, &image(&bench, "point.txt", &shown));
 }
 
 #[test]
@@ -118,18 +64,6 @@ fn a_damaged_recording_is_recovered_into_the_named_file_alone() {
     bench.run(&[&recover[..], &["--overwrite"]].concat()).succeeded();
     assert_eq!(std::fs::read(bench.path("new.mcap")).unwrap(), new);
     assert_eq!(bench.names(), ["cut.mcap", "new.mcap"]);
-}
-
-#[test]
-fn twice_the_range_of_the_data_is_6_db_more() {
-    let bench = Bench::new();
-    bench.write("a.npy", &npy::encode(&[16, 16], &[0.5_f32; 256]));
-    bench.write("b.npy", &npy::encode(&[16, 16], &[0.6_f32; 256]));
-    let psnr = |range: &str| {
-        let said = report(&bench, &["metrics", "a.npy", "b.npy", "--data-range", range]);
-        said["each"][0]["psnr_db"].as_f64().unwrap()
-    };
-    assert!((psnr("1") - 20.0).abs() < 1e-3 && (psnr("2") - psnr("1") - 6.0206).abs() < 1e-3);
 }
 
 #[test]
@@ -181,11 +115,7 @@ fn without_agreement_with_the_readings_the_network_alone_decides() {
 fn atoms(bench: &Bench, more: &[&str]) -> Vec<u8> {
     let all = ["dev", "bench", "omp", "--out", "solution.npz", "--overwrite", "--repeats", "1"];
     bench.run(&[&all, more].concat()).succeeded();
-    let file = std::fs::File::open(bench.path("solution.npz")).unwrap();
-    let mut archive = zip::ZipArchive::new(file).unwrap();
-    let mut bytes = Vec::new();
-    std::io::Read::read_to_end(&mut archive.by_name("support.npy").unwrap(), &mut bytes).unwrap();
-    bytes
+    array(&bench.path("solution.npz"), "support")
 }
 
 #[test]

@@ -1,99 +1,68 @@
 //! `nirspi reconstruct --matrix`: patterns of the user's own, in whatever form they come.
 
-use crate::bench::{Bench, Measured, correlation, npz, provenance};
+use crate::bench::{Bench, Measured, bits, correlation, npz, provenance, seen};
 use nirspi::files::image::encode_grey;
 use nirspi::files::npy;
 
 /// Patterns of zeros and ones that no one has a name for, and what they measure of the phantom.
 fn own_patterns(measured: &Measured, patterns: usize) -> (Vec<f32>, Vec<f32>) {
-    let area = measured.n * measured.n;
-    let mut state = 1_u32;
-    let weights: Vec<f32> = (0..patterns * area)
-        .map(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 31) as f32
-        })
-        .collect();
-    let see = |p: &[f32]| p.iter().zip(&measured.image).map(|(w, v)| w * v).sum::<f32>();
-    let y = weights.chunks_exact(area).map(see).collect();
+    let weights = bits(patterns * measured.image.len());
+    let y = seen(&weights, &measured.image);
     (weights, y)
 }
 
-/// Fourier readings and those of a cyclic S-matrix by the name of their patterns.
+/// `order` writes the patterns of a set, which give the image of their readings by the set's name and as a file. That a
+/// set's patterns are those of its definition is tested in `nirspi-files` and `nirspi-patterns`.
 #[test]
 fn sets_of_patterns_have_names() {
     let bench = Bench::new();
-    let scene: Vec<f64> = (0..48).map(|at| f64::from(at * 37 % 23) + 1.0).collect();
-    let see = |weight: &dyn Fn(usize) -> f64| (0..48).map(|at| weight(at) * scene[at]).sum::<f64>();
-    let mut steps = String::new();
-    for frequency in 0..48 {
-        let turns = |at: usize| {
-            ((frequency / 8) * (at / 8)) as f64 / 6.0 + ((frequency % 8) * (at % 8)) as f64 / 8.0
-        };
-        for step in 0..4 {
-            let moved = f64::from(step) / 4.0;
-            let weight = |at| 0.5 + 0.5 * (std::f64::consts::TAU * (turns(at) + moved)).cos();
-            steps += &format!("{}\n", 7.0 + see(&weight));
+    for (set, size, square) in [
+        ("s-matrix:15", "3x5", &[][..]),
+        ("fourier:3", "6x6", &["--n", "6"]),
+        ("fourier:4", "6x6", &["--n", "6"]),
+    ] {
+        bench.run(&[&["order", set, "--out", "set"], square].concat()).succeeded();
+        let area = if square.is_empty() { 15 } else { 36 };
+        let scene: Vec<f32> = (0..area).map(|at| (at * 37 % 23) as f32 + 1.0).collect();
+        let y = seen(&bench.pixels("set/patterns.npy"), &scene);
+        let lines: String = y.iter().map(|reading| format!("{reading}\n")).collect();
+        bench.write("y.txt", lines.as_bytes());
+        for (patterns, more) in [(set, &["--size", size][..]), ("set/patterns.npy", &[])] {
+            let line = ["reconstruct", "y.txt", "--matrix", patterns, "--method", "pseudo-inverse"];
+            let said = bench.run(&[&line[..], &["--no-dark"], more].concat()).succeeded().stdout;
+            let image = bench.pixels("out/image.npy");
+            assert!(image.iter().zip(&scene).all(|(a, b)| (a - b).abs() < 0.01), "{patterns}");
+            let whole = format!("{area} of {area} patterns of {set}");
+            assert!(patterns != set || said.contains(&whole), "{said}");
         }
-    }
-    bench.write("steps.txt", steps.as_bytes());
-    let image = ["reconstruct", "steps.txt", "--matrix", "fourier:4", "--size", "6x8"];
-    let said = bench
-        .run(&[&image[..], &["--method", "pseudo-inverse", "--out", "f"]].concat())
-        .succeeded()
-        .stdout;
-    assert!(said.contains("48 of 48 patterns of fourier:4, rank 48"), "{said}");
-    let close = |found: &[f32], scene: &[f64], most: f64| {
-        found.iter().zip(scene).all(|(found, pixel)| (f64::from(*found) - pixel).abs() < most)
-    };
-    assert!(close(&bench.pixels("f/image.npy"), &scene, 0.01));
-    // Order 15: a shift register of 4 bits, as a table of 3 x 5 pixels.
-    let row = [1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 1, 1, 0, 1, 0];
-    let y: String = (0..15)
-        .map(|by| (0..15).map(|at| f64::from(row[(at + by) % 15]) * scene[at]).sum::<f64>())
-        .map(|reading| format!("{reading}\n"))
-        .collect();
-    bench.write("s.txt", y.as_bytes());
-    let image = ["reconstruct", "s.txt", "--matrix", "s-matrix:15", "--no-dark"];
-    let said = bench.run(&[&image[..], &["--method", "pseudo-inverse", "--out", "s"]].concat());
-    assert!(said.succeeded().stdout.contains("s.txt: 3 x 5, 15 of 15 patterns"));
-    assert!(close(&bench.pixels("s/image.npy"), &scene[..15], 0.01));
-    // `order` writes the patterns of a set, which give the same image as a file.
-    for (set, more, file) in [("s-matrix:15", &[][..], "s.txt"), ("fourier:3", &["--n", "6"], "y")]
-    {
-        let order = [&["order", set, "--out", "set"][..], more].concat();
-        bench.run(&order).succeeded();
-        if file == "y" {
-            let pixels = &scene[..36];
-            let see =
-                |row: &[f32]| row.iter().zip(pixels).map(|(w, x)| f64::from(*w) * x).sum::<f64>();
-            let y: String = bench
-                .pixels("set/patterns.npy")
-                .chunks_exact(36)
-                .map(|row| format!("{}\n", see(row)))
-                .collect();
-            bench.write(file, y.as_bytes());
-        }
-        let image = |patterns: &str, more: &[&str]| {
-            let line = ["reconstruct", file, "--matrix", patterns, "--method", "pseudo-inverse"];
-            bench.run(&[&line[..], &["--no-dark", "--out", "o"], more].concat()).succeeded();
-            bench.pixels("o/image.npy")
-        };
-        let size = if file == "y" { &["--size", "6x6"][..] } else { &[] };
-        assert!(
-            close(&image(set, size), &scene, 0.01)
-                && close(&image("set/patterns.npy", &[]), &scene, 0.01)
-        );
+        std::fs::remove_dir_all(bench.path("set")).unwrap();
     }
     bench.run(&["order", "s-matrix:15", "--n", "8"]).failed(2, &["--n does not go with this set"]);
     bench.run(&["order", "s-matrix:9"]).failed(2, &["s-matrix:9: expected an order up to 4095"]);
     let refused = |set: &str, words: &str| {
-        bench.run(&["reconstruct", "s.txt", "--matrix", set]).failed(1, &[words]);
+        bench.run(&["reconstruct", "y.txt", "--matrix", set]).failed(1, &[words]);
     };
     refused("fourier:6", "expected fourier:3, fourier:4, or s-matrix:N");
-    refused("s-matrix:16", "expected an order up to 4095");
     refused("s-matrix:31", "expected (31,)");
-    refused("fourier:4", "expected (height, width, 4)");
+}
+
+/// Ambient light is in each reading alike. That it is found is tested in `nirspi-recon`.
+#[test]
+fn the_dark_level_is_told_and_left_out_on_demand() {
+    let (bench, measured) = (Bench::new(), Measured::new(16));
+    let (weights, y) = own_patterns(&measured, 140);
+    let lifted: Vec<f32> = y.iter().map(|y| y + 500.0).collect();
+    bench.write("phi.npy", &npy::encode(&[140, 256], &weights));
+    bench.write("in.npz", &npz(&[("y", &[140], &lifted)]));
+    let run = |more: &[&str]| {
+        let all = ["reconstruct", "in.npz", "--matrix", "phi.npy", "--method", "tv"];
+        let said = bench.run(&[&all, more].concat()).succeeded().stdout;
+        (said.contains("dark level "), bench.json("out/report.json")["dark_level"].clone())
+    };
+    let (is_told, level) = run(&[]);
+    assert!(is_told && (level.as_f64().unwrap() / 500.0 - 1.0).abs() < 0.05, "{level}");
+    assert_eq!(run(&["--no-dark"]), (false, ().into()));
+    bench.run(&["reconstruct", "in.npz", "--no-dark"]).failed(2, &["--matrix"]);
 }
 
 #[test]
@@ -180,15 +149,8 @@ fn of_size(height: usize, width: usize, patterns: usize) -> (Vec<f32>, Vec<f32>,
             () => 0.1,
         })
         .collect();
-    let mut state = 1_u32;
-    let weights: Vec<f32> = (0..patterns * height * width)
-        .map(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 31) as f32
-        })
-        .collect();
-    let see = |p: &[f32]| p.iter().zip(&scene).map(|(w, v)| w * v).sum::<f32>();
-    let y = weights.chunks_exact(height * width).map(see).collect();
+    let weights = bits(patterns * height * width);
+    let y = seen(&weights, &scene);
     (scene, weights, y)
 }
 
@@ -251,44 +213,6 @@ fn patterns_come_in_any_size_and_form() {
     bench.write("rows.npy", &npy::encode(&[90, 100], &weights));
     bench.run(&["reconstruct", "y.npy", "--matrix", "rows.npy"]).succeeded();
     assert!(correlation(&bench.pixels("out/image.npy"), &scene) > 0.9);
-}
-
-/// Fewer patterns than pixels of sides that have no Hadamard matrix, and more patterns than pixels; 0 and 1, and grey.
-#[test]
-#[ignore = "long: .ci/run demo"]
-fn benches_with_other_patterns_get_their_images() {
-    let bench = Bench::new();
-    for (height, width, share, levels) in
-        [(12, 15, 0.6, 1), (10, 10, 0.6, 1), (28, 28, 0.6, 1), (12, 15, 4.0, 1), (16, 16, 4.0, 255)]
-    {
-        let count = (share * (height * width) as f64) as usize;
-        let (scene, mut weights, mut y) = of_size(height, width, count);
-        if levels > 1 {
-            let grey = |at: usize| ((at * at * 31 + at * 17) % 253 % (levels + 1)) as f32 / 255.0;
-            weights = (0..weights.len()).map(|at| 0.5 * weights[at] + 0.5 * grey(at)).collect();
-            let see = |p: &[f32]| p.iter().zip(&scene).map(|(w, v)| w * v).sum::<f32>();
-            y = weights.chunks_exact(height * width).map(see).collect();
-        }
-        let text: String = y.iter().map(|y| format!("np.float64({y})\n")).collect();
-        bench.write("y.txt", text.as_bytes());
-        bench.write("phi.npy", &npy::encode(&[count, height, width], &weights));
-        let line = ["reconstruct", "y.txt", "--matrix", "phi.npy", "--method", "tv"];
-        bench.run(&line).succeeded();
-        let alike = correlation(&bench.pixels("out/image.npy"), &scene);
-        assert!(alike > 0.95, "{height} x {width}, {count} patterns: {alike}");
-    }
-    // The cyclic S-matrix of a bench of 255 pixels, by its name.
-    let order = ["order", "s-matrix:255", "--out", "set"];
-    bench.run(&order).succeeded();
-    let (scene, ..) = of_size(15, 17, 1);
-    let patterns = bench.pixels("set/patterns.npy");
-    let see = |p: &[f32]| p.iter().zip(&scene).map(|(w, v)| w * v).sum::<f32>() + 7.0;
-    let y: Vec<f32> = patterns.chunks_exact(255).map(see).collect();
-    bench.write("y.npy", &npy::encode(&[255], &y));
-    let line = ["reconstruct", "y.npy", "--matrix", "s-matrix:255", "--size", "15x17"];
-    bench.run(&[&line[..], &["--method", "tikhonov"]].concat()).succeeded();
-    let alike = correlation(&bench.pixels("out/image.npy"), &scene);
-    assert!(alike > 0.99, "{alike}");
 }
 
 /// An array of two axes as `save -v4` of MATLAB writes it.

@@ -1,26 +1,7 @@
 //! `nirspi dev pairs`: scenes and the virtual camera's pictures of them, to train networks on.
 
-use crate::bench::{Bench, provenance};
+use crate::bench::{Bench, array, provenance};
 use nirspi::files::image::encode_grey;
-use std::io::Read;
-
-/// The arrays of a `.npz` file, by name.
-fn arrays(bench: &Bench, path: &str) -> Vec<(String, Vec<u8>)> {
-    let file = std::fs::File::open(bench.path(path)).unwrap();
-    let mut archive = zip::ZipArchive::new(file).unwrap();
-    let names: Vec<String> = archive.file_names().map(|name| name.unwrap().into_owned()).collect();
-    // The provenance has the command and the time.
-    let names = names.into_iter().filter(|name| name != "provenance.npy");
-    let mut arrays: Vec<_> = names
-        .map(|name| {
-            let mut bytes = Vec::new();
-            archive.by_name(&name).unwrap().read_to_end(&mut bytes).unwrap();
-            (name, bytes)
-        })
-        .collect();
-    arrays.sort();
-    arrays
-}
 
 #[test]
 fn pairs_are_as_many_as_asked_and_those_of_their_seed() {
@@ -29,7 +10,9 @@ fn pairs_are_as_many_as_asked_and_those_of_their_seed() {
         let args = ["dev", "pairs", "--count", "3", "--seed", seed, "--out", out, "--json"];
         let report = bench.run(&args).succeeded().json();
         assert_eq!((&report["pairs"], &report["simulated"]), (&3.into(), &true.into()));
-        arrays(&bench, out)
+        // The provenance has the command and the time.
+        ["x", "optical", "y", "depth_m", "noise_std", "distance_m", "sweeps"]
+            .map(|name| array(&bench.path(out), name))
     };
     let first = pairs("1", "a.npz");
     assert_eq!(pairs("1", "b.npz"), first);
@@ -62,11 +45,8 @@ fn characters_of_chars74ks_folder_become_stacks_to_which_the_pairs_refer() {
     assert_eq!(report["data"]["stacks"][1]["stack"], "hnd", "{report}");
 
     let numbers = |file: &str, name: &str| -> Vec<i64> {
-        let arrays = arrays(&bench, file);
-        let (_, bytes) = arrays.iter().find(|array| array.0 == format!("{name}.npy")).unwrap();
-        let header = usize::from(bytes[8]) + 256 * usize::from(bytes[9]) + 10;
-        let numbers = bytes[header..].as_chunks::<8>().0.iter();
-        numbers.map(|number| i64::from_le_bytes(*number)).collect()
+        let bytes = array(&bench.path(file), name);
+        bytes.as_chunks::<8>().0.iter().map(|number| i64::from_le_bytes(*number)).collect()
     };
     assert_eq!(numbers("letters/000-fnt.npz", "label"), [10, 10, 10]);
     assert_eq!(numbers("letters/001-hnd.npz", "label"), [0, 0]);

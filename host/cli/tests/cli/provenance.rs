@@ -1,13 +1,12 @@
 //! Every picture, report and export says where its readings come from and what made it.
 
-use crate::bench::{Bench, Outcome, npz};
+use crate::bench::{Bench, Outcome, array, npz};
 use crate::serve::serve;
 use nirspi::files::image::{encode_grey, provenance_of};
 use nirspi::files::npy::encode;
 use nirspi::provenance::{Made, Origin, Provenance, Taken};
 use serde_json::Value;
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Seconds since 1970, and the same moment in words.
@@ -35,10 +34,7 @@ fn of_json(what: &str, json: &Value) -> Provenance {
 
 /// The field `provenance` of an `.npz` file: NumPy's text, four bytes a letter.
 fn of_npz(path: &Path) -> Provenance {
-    let mut archive = zip::ZipArchive::new(fs::File::open(path).unwrap()).unwrap();
-    let mut bytes = Vec::new();
-    archive.by_name("provenance.npy").unwrap().read_to_end(&mut bytes).unwrap();
-    let text = &bytes[10 + usize::from(bytes[8]) + 256 * usize::from(bytes[9])..];
+    let text = array(path, "provenance");
     let letters = text.as_chunks::<4>().0.iter().map(|&letter| u32::from_le_bytes(letter));
     let text: String = letters.map(|letter| char::from_u32(letter).unwrap()).collect();
     serde_json::from_str(&text).unwrap()

@@ -23,24 +23,9 @@ fn every_row_is_measured_on_the_same_unseen_images() {
     bench.write("unseen.json", br#"{"own": [3, 1]}"#);
     std::fs::create_dir(bench.path("measured")).unwrap();
     bench.write("measured/disc.npz", &Measured::new(32).npz());
-    let arguments = [
-        "eval",
-        "quality",
-        "--data",
-        "own.npz",
-        "--held-out",
-        "unseen.json",
-        "--spi",
-        "measured",
-        "--count",
-        "2",
-        "--sampler-count",
-        "2",
-        "--most-steps",
-        "1",
-        "--json",
-    ];
-    let report = bench.run(&arguments).succeeded().json();
+    let line = "eval quality --data own.npz --held-out unseen.json --spi measured --count 2 --sampler-count 2 \
+                --most-steps 1 --json";
+    let report = bench.run_line(line).succeeded().json();
     assert_eq!(report["images"][0]["images"], 2, "{report}");
     assert_eq!(report["images"][0]["choice"], "of 4 held out");
     let conditions = report["conditions"].as_array().unwrap();

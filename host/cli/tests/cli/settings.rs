@@ -94,10 +94,6 @@ fn settings_that_cannot_be_are_refused_in_one_line_with_code_2() {
         bench.run(&command).failed(2, words);
     };
     refused("lens = 0.3", &["lab.toml", "`lens` is not the name of an option"]);
-    refused("[reconstruct]\nframes = 3", &["`[reconstruct] frames` is not the name of an option"]);
-    refused("[replay]\nframes = 3", &["`replay` is not the name of a command"]);
-    refused("sampling = 3 0", &["lab.toml", "line 1"]);
-    refused("transpose = 1", &["`transpose` is 1", "true or false"]);
     refused("sampling = 400", &["'400'", "--sampling comes from lab.toml"]);
     refused("method = \"magic\"", &["magic", "hadamard", "--method comes from lab.toml"]);
     let variable = [("NIRSPI_SAMPLING", "many")];

@@ -1,17 +1,7 @@
 //! `nirspi dev bench omp` and `nirspi eval sampling`.
 
-use crate::bench::{Bench, Measured, npz};
-use std::io::{Read, Write};
-
-/// Numbers of one array of an `.npz` file, of eight bytes each.
-fn array(bench: &Bench, file: &str, name: &str, number: fn([u8; 8]) -> f64) -> Vec<f64> {
-    let file = std::fs::File::open(bench.path(file)).unwrap();
-    let mut bytes = Vec::new();
-    let mut archive = zip::ZipArchive::new(file).unwrap();
-    archive.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
-    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    bytes[header..].as_chunks().0.iter().copied().map(number).collect()
-}
+use crate::bench::{Bench, Measured, array, npz};
+use std::io::Write;
 
 /// Two frames over eight spikes and one even atom of unit norm.
 fn problem() -> Vec<u8> {
@@ -27,30 +17,28 @@ fn problem() -> Vec<u8> {
     npz(&[("D", &[8, 9], &dictionary), ("Y", &[2, 8], &frames), ("k", &[], &[2.0])])
 }
 
+/// Solves the problem, and gives the report.
+#[track_caller]
+fn solved(bench: &Bench, more: &[&str]) -> serde_json::Value {
+    bench.write("problem.npz", &problem());
+    let line = ["dev", "bench", "omp", "--input", "problem.npz", "--out", "solution.npz"];
+    let line = [&line[..], &["--overwrite", "--repeats", "2"], more].concat();
+    let report = bench.run(&line).succeeded().json();
+    assert!(report["median_ms"].as_f64().unwrap() > 0.0, "{report}");
+    assert_eq!((&report["frames"], &report["atoms"]), (&2.into(), &9.into()));
+    let solution = |name| array(&bench.path("solution.npz"), name).as_chunks().0.to_vec();
+    assert_eq!(solution("support"), [5_i64, 2, 8, 1].map(i64::to_le_bytes));
+    let coef: Vec<f64> = solution("coef").into_iter().map(f64::from_le_bytes).collect();
+    let off = [coef[0] + 4.0, coef[1] - 3.0, coef[3] - 2.0];
+    assert!(off.iter().all(|off| off.abs() < 1e-5), "{coef:?}");
+    report
+}
+
 #[test]
 fn a_given_problem_is_solved_and_timed() {
     let bench = Bench::new();
-    bench.write("problem.npz", &problem());
     for precision in ["auto", "f32", "f64"] {
-        let arguments = [
-            "dev",
-            "bench",
-            "omp",
-            "--input",
-            "problem.npz",
-            "--out",
-            "solution.npz",
-            "--overwrite",
-        ];
-        let further = ["--repeats", "3", "--precision", precision];
-        let report = bench.run(&[&arguments[..], &further].concat()).succeeded().json();
-        assert!(report["median_ms"].as_f64().unwrap() > 0.0, "{report}");
-        assert_eq!((&report["frames"], &report["atoms"]), (&2.into(), &9.into()));
-        let support = array(&bench, "solution.npz", "support", |b| i64::from_le_bytes(b) as f64);
-        assert_eq!(support, [5.0, 2.0, 8.0, 1.0]);
-        let coef = array(&bench, "solution.npz", "coef", f64::from_le_bytes);
-        assert!((coef[0] + 4.0).abs() < 1e-6 && (coef[1] - 3.0).abs() < 1e-6, "{coef:?}");
-        assert!((coef[3] - 2.0).abs() < 1e-5, "{coef:?}");
+        solved(&bench, &["--precision", precision]);
     }
 }
 
@@ -90,27 +78,12 @@ fn adapter(bench: &Bench) -> Option<String> {
 fn a_device_asked_for_by_name_computes_and_is_named() {
     let bench = Bench::new();
     let Some(adapter) = adapter(&bench) else { return };
-    bench.write("problem.npz", &problem());
     for precision in ["auto", "f32"] {
-        let arguments = [
-            "dev",
-            "bench",
-            "omp",
-            "--input",
-            "problem.npz",
-            "--out",
-            "solution.npz",
-            "--repeats",
-            "2",
-        ];
-        let named = ["--backend", "wgpu", "--precision", precision];
-        let report = bench.run(&[&arguments[..], &named].concat()).succeeded().json();
-        assert_eq!(report["device"], adapter.as_str());
-        assert_eq!(report["backend"], "wgpu");
-        let support = array(&bench, "solution.npz", "support", |b| i64::from_le_bytes(b) as f64);
-        assert_eq!(support, [5.0, 2.0, 8.0, 1.0]);
-        let coef = array(&bench, "solution.npz", "coef", f64::from_le_bytes);
-        assert!((coef[0] + 4.0).abs() < 1e-5 && (coef[3] - 2.0).abs() < 1e-5, "{coef:?}");
+        let report = solved(&bench, &["--backend", "wgpu", "--precision", precision]);
+        assert_eq!(
+            (&report["device"], &report["backend"]),
+            (&adapter.as_str().into(), &"wgpu".into())
+        );
     }
     let double = ["dev", "bench", "omp", "--backend", "wgpu", "--precision", "f64"];
     bench.run(&double).failed(1, &["f32", "cpu backend for f64"]);

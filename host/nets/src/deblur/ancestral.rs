@@ -164,6 +164,23 @@ mod tests {
     }
 
     #[test]
+    fn a_schedule_of_no_steps_is_refused() {
+        for (key, text, words) in [
+            ("steps", "NaN", "steps is NaN, expected a whole number from 1 to 10000"),
+            ("steps", "0", "steps is 0, expected a whole number"),
+            ("beta_end", "1.5", "beta_end is 1.5, expected a number between 0 and 1"),
+        ] {
+            let mut weights = Weights::new("altered");
+            let schedule = [("steps", "500"), ("beta_start", "0.01"), ("beta_end", "0.02")];
+            for (key, text) in schedule.into_iter().chain([(key, text)]) {
+                weights.set_metadata(key, text);
+            }
+            let line = Schedule::of(&weights).unwrap_err().to_string();
+            assert!(line.contains(words), "{line}");
+        }
+    }
+
+    #[test]
     fn with_an_oracle_any_number_of_steps_ends_at_the_image() {
         let schedule = Schedule::linear(500, 2e-4, 0.025);
         let images = vec![0.5; 2 * AREA];

@@ -567,6 +567,17 @@ fn doubts_say_numbers_and_what_to_do() {
         doubt.to_string(),
         "512 readings: 429 are below the all-off reading; the readings fit the form `halves`: try --readings halves"
     );
+    for (claimed, explanation, words) in [
+        (Form::Pairs, Explanation::OneEarly, "pairs that are one reading early"),
+        (Form::Pairs, Explanation::OneLate, "pairs that are one reading late"),
+        (Form::Pairs, Explanation::Inverted, "inverting amplifier"),
+        (Form::Single, Explanation::Inverted, "patterns that light the -1 instead of the +1"),
+        (Form::Pairs, Explanation::Samples { each: 4 }, "4 samples of each reading"),
+        (Form::Pairs, Explanation::ComplementsFirst(Form::Pairs), "complement first"),
+    ] {
+        let line = Doubt::Form { claimed, broken, explanation }.to_string();
+        assert!(line.contains(words), "{words}: {line}");
+    }
     let why = Impossible::AboveAllOn { all_on: 83.770_024_6 };
     let outlier = Outlier { reading: 77, value: 32767.0, row: 38, why };
     assert_eq!(outlier.to_string(), "32767 is above the all-on reading 83.77");
