@@ -155,7 +155,7 @@ fn capture_alone_builds_no_server_no_typefaces_no_optics_and_no_networks() {
     };
     let (capture, all) = (tree(&["--no-default-features"]), tree(&[]));
     assert!(capture.contains("nirspi-wire") && capture.contains("nirspi-recon"), "{capture:?}");
-    for heavy in ["ab_glyph", "zune-jpeg", "nirspi-nets", "cubecl"] {
+    for heavy in ["ab_glyph", "pdf-writer", "nirspi-nets", "cubecl"] {
         assert!(all.contains(heavy), "the full library has {heavy}");
         assert!(!capture.contains(heavy), "capture alone builds {heavy}");
     }

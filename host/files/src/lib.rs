@@ -23,7 +23,6 @@ pub mod feed;
 #[cfg(not(target_family = "wasm"))]
 pub mod folder;
 pub mod identity;
-#[cfg(feature = "pictures")]
 pub mod image;
 pub mod interrupt;
 #[cfg(not(target_family = "wasm"))]
@@ -45,7 +44,7 @@ mod field;
 mod fields;
 #[cfg(not(target_family = "wasm"))]
 mod formats;
-#[cfg(feature = "hdf5")]
+#[cfg(not(target_family = "wasm"))]
 mod hdf5;
 #[cfg(not(target_family = "wasm"))]
 mod mat;
