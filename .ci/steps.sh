@@ -572,7 +572,7 @@ step_cuda() {
 
 step_cuda_source() {
     # A feature that no other step has.
-    cargo clippy --locked -p nirspi-nets --features source --lib --example cuda_source -- -D warnings
+    cargo clippy --locked -p nirspi-nets --features gpu,nirspi-gpu/source --lib --example cuda_source -- -D warnings
     cargo test --locked -p nirspi-gpu --features source --lib source::
     # Some kernels are known to spill 4 to 24 bytes, more or fewer from run to run; more than 32 is an error.
     python3 host/gpu/scripts/cuda_source.py --allow 'agreement-kernels-agree-*=32' \
