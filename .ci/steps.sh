@@ -261,7 +261,7 @@ step_licence_texts() {
 step_deb() {
     tool cargo-deb 3.8.0
     [ -f target/licences.html ] || step_licence_texts
-    cargo build --locked --release --features flash,wgpu
+    cargo build --locked --release --features flash,wgpu --bin nirspi
     local nirspi=target/release/nirspi shell
     "$nirspi" dev man target/package/man
     for shell in bash zsh fish; do "$nirspi" dev completions "$shell" >"target/package/nirspi.$shell"; done
@@ -305,7 +305,7 @@ step_silicon() {
     cp "$(elf "$board")" boards/target/silicon/parallel
     bash boards/build.sh "$board"
     sha256sum "$(elf "$board")" | tee target/silicon.sha256
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     silicon_tests 2>&1 | tee target/silicon.log
     if grep '^skipped: ' target/silicon.log; then return 1; fi
 }
@@ -388,7 +388,7 @@ python_package() {
 step_python() {
     python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 nptdms==1.13.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     (
         cd host/python
         "$bin/ruff" format --check --config pyproject.toml python tests ../../docs/notebooks
@@ -417,7 +417,7 @@ step_python_peers() {
     # Has wheels for few systems.
     target/python/bin/pip install --quiet spams-bin==2.6.14 || echo "skipped: SPAMS, no wheel"
     # The training too: it is the only step with torch.
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/peers tests/test_train.py)
 }
 
@@ -440,7 +440,7 @@ step_memory() {
 in_browser() {
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release
+        cargo build --locked --release --bin nirspi
         python_with browser playwright==1.65.2
         target/browser/bin/python "host/cli/tests/browser/$1" target/release/nirspi
     else
@@ -462,7 +462,7 @@ step_led_truth() { led_truth "${EVENTS:-10000}"; }
 led_truth() {
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release
+        cargo build --locked --release --bin nirspi
         # Not a release build, for the reason in step `web`.
         cargo build --locked --example led_log
         python_with browser playwright==1.65.2
@@ -488,7 +488,7 @@ step_web() {
     [ "$bytes" -lt 12000000 ]
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release
+        cargo build --locked --release --bin nirspi
         # Step `test` has built what it needs. A release build of an example has other features than the program, and would
         # build the networks, the GPU kernels and the program once more.
         cargo build --locked --example in_turns
@@ -502,7 +502,7 @@ step_web() {
 }
 
 step_tcp() {
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     local nirspi=target/release/nirspi server address
     "$nirspi" dev virtual --listen 127.0.0.1:0 --precompute 8 --once >"$out/server.log" &
     server=$!
@@ -518,7 +518,7 @@ step_tcp() {
 }
 
 step_recordings() {
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 pillow
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
@@ -630,7 +630,7 @@ step_coverage() {
 }
 
 step_crowd() {
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     python3 host/scripts/serve_soak.py "${CARGO_TARGET_DIR:-target}/release/nirspi" --seconds "${CROWD_S:-600}"
 }
 
