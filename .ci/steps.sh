@@ -32,7 +32,7 @@ steps=(
 turn_hours=5
 turns=(
     "defaults        the default method beside every other one, and videos beside their frames, in tests that take long"
-    "gpu             OMP's GPU kernels on software Vulkan; Debian"
+    "gpu             OMP's GPU kernels on software Vulkan, and the CUDA driver for tests; Debian"
     "features        the library without features, and the live page for a browser, without its server; rustup's target"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "rtl-long        the self-test of the bring-up design through the RTL, which takes three minutes"
@@ -45,7 +45,7 @@ turns=(
 # commit: they have no files here, and run only when it is their turn.
 turn_files() {
     case $1 in
-        gpu) echo host/gpu/src host/omp/src ;;
+        gpu) echo host/gpu/src host/omp/src tests/cuda/src ;;
         mie) echo host/optics/src/mie.rs host/optics/examples host/optics/scripts ;;
         rtl-long) echo hdl/rtl hdl/boards host/camera/src/selftest ;;
         verilator) echo hdl/sv hdl/verilator ;;
@@ -170,6 +170,7 @@ step_test() {
 step_defaults() { cargo test --locked --lib --test defaults -- --ignored; }
 
 step_gpu() {
+    cargo test --locked -p nirspi-tests-cuda --lib
     software_vulkan
     gpu_tests -p nirspi-gpu -p nirspi-omp --features nirspi-gpu/wgpu,nirspi-omp/gpu --lib -- gpu:: pursuit:: cache::
 }
