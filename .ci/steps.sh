@@ -163,8 +163,9 @@ emulated_firmware() {
     export NIRSPI_FIRMWARE_ELF
 }
 
+# With the number of threads of .cargo/config.toml, as for a user.
 step_test() {
-    cargo test --locked
+    env -u RUST_TEST_THREADS cargo test --locked
 }
 
 step_defaults() { cargo test --locked --lib --test defaults -- --ignored; }
