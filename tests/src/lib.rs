@@ -1,6 +1,4 @@
-//! Shared parts of the end-to-end tests, with the feature `library`.
-
-#![cfg(feature = "library")]
+//! Shared parts of the end-to-end tests.
 
 pub mod debugger;
 pub mod elf;

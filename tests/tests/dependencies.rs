@@ -155,7 +155,7 @@ fn capture_alone_builds_no_server_no_typefaces_no_optics_and_no_networks() {
     };
     let (capture, all) = (tree(&["--no-default-features"]), tree(&[]));
     assert!(capture.contains("nirspi-wire") && capture.contains("nirspi-recon"), "{capture:?}");
-    for heavy in ["ab_glyph", "zune-jpeg", "nirspi-nets", "cubecl"] {
+    for heavy in ["ab_glyph", "pdf-writer", "nirspi-nets", "cubecl"] {
         assert!(all.contains(heavy), "the full library has {heavy}");
         assert!(!capture.contains(heavy), "capture alone builds {heavy}");
     }
@@ -172,11 +172,16 @@ fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest()
     let name = |package: &Value| package["name"].as_str().unwrap().to_owned();
     let (default, left_out): (Vec<&Value>, Vec<&Value>) =
         packages.iter().partition(|package| default.contains(&&package["id"]));
-    // The program for browsers, the Python package and the ELF on a model of its chip have steps of their own, and a list
-    // of features has nothing to test.
+    // The program for browsers, the Python package, the ELF on a model of its chip and the CUDA driver for tests have steps
+    // of their own, and a list of features has nothing to test.
     let (apart, left_out): (Vec<&Value>, Vec<&Value>) = left_out.into_iter().partition(|package| {
-        let apart =
-            ["nirspi-web", "nirspi-python", "nirspi-tests-features", "nirspi-tests-silicon"];
+        let apart = [
+            "nirspi-web",
+            "nirspi-python",
+            "nirspi-tests-cuda",
+            "nirspi-tests-features",
+            "nirspi-tests-silicon",
+        ];
         apart.contains(&&*name(package))
     });
     let uses_simulator = |package: &&Value| {
@@ -194,12 +199,16 @@ fn plain_cargo_test_leaves_out_simulator_and_browser_only_and_ci_runs_the_rest()
     let steps = std::fs::read_to_string(root().join(".ci/steps.sh")).unwrap();
     assert_eq!(
         apart.len(),
-        4,
-        "left out: the programs for browsers and Python, the list of features, the model of the chip"
+        5,
+        "left out: the programs for browsers and Python, the list of features, the model of the chip, the CUDA driver"
     );
     assert!(
         steps.contains("-p nirspi-tests-silicon"),
         ".ci/steps.sh does not run the ELF on a model of its chip"
+    );
+    assert!(
+        steps.contains("cargo test --locked -p nirspi-tests-cuda"),
+        ".ci/steps.sh does not run the tests of the CUDA driver"
     );
     assert!(steps.contains("bash host/web/build.sh"), ".ci/steps.sh builds no page for browsers");
     assert!(steps.contains("./host/python\n"), ".ci/steps.sh builds no Python package");

@@ -8,7 +8,6 @@ use super::FileError;
 use super::archive::Archive;
 use super::field::{Field, is_counter};
 use super::formats::{self, Columns, EXPECTED};
-#[cfg(feature = "hdf5")]
 use super::hdf5::Hdf5;
 use super::mat::Mat;
 use super::mat4::Mat4;
@@ -56,7 +55,6 @@ enum Format {
     Npz(Archive),
     Mat(Mat),
     Mat4(Mat4),
-    #[cfg(feature = "hdf5")]
     Hdf5(Hdf5),
     /// Columns of a text with a heading.
     Columns(Vec<Field>),
@@ -167,7 +165,6 @@ impl Fields {
             Format::Npz(_) => "a NumPy archive",
             Format::Mat(_) => "a MATLAB file",
             Format::Mat4(_) => "a MATLAB file of level 4",
-            #[cfg(feature = "hdf5")]
             Format::Hdf5(_) => "an HDF5 file",
             _ if self.is_text => "a text table",
             Format::Columns(_) | Format::Unnamed(_) => {
@@ -346,7 +343,6 @@ impl Fields {
             Format::Npz(archive) => return archive.field(&own, accept),
             Format::Mat(mat) => return mat.read(&own, accept),
             Format::Mat4(mat) => return mat.read(&own, accept),
-            #[cfg(feature = "hdf5")]
             Format::Hdf5(file) => return file.read(&own, accept),
             Format::Columns(_) | Format::Unnamed(_) => held,
         };
@@ -418,7 +414,6 @@ impl Fields {
     }
 }
 
-#[cfg(feature = "hdf5")]
 fn open_hdf5(
     path: &Path,
     length: u64,
@@ -426,16 +421,6 @@ fn open_hdf5(
 ) -> Result<(Vec<String>, Format), FileError> {
     let file = Hdf5::open(path, whole(path, length, "an HDF5 file")?, is_matlab)?;
     Ok((file.names()?, Format::Hdf5(file)))
-}
-
-#[cfg(not(feature = "hdf5"))]
-fn open_hdf5(path: &Path, _: u64, is_matlab: bool) -> Result<(Vec<String>, Format), FileError> {
-    let found = if is_matlab { "a MATLAB 7.3 file" } else { "an HDF5 file" };
-    Err(FileError::kind(
-        path,
-        format!("{found}, which this build does not read"),
-        "a build with the feature hdf5, or the file saved as MATLAB 7 (save -v7) or .npz",
-    ))
 }
 
 /// The bytes of a file of at most 1 GiB.

@@ -2,7 +2,6 @@
 
 use super::FileError;
 use super::formats::ENDINGS;
-#[cfg(feature = "pictures")]
 use std::cmp::Ordering;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -64,7 +63,6 @@ fn collect(
 }
 
 /// The order of two files whose names count: `p2` before `p10`.
-#[cfg(feature = "pictures")]
 pub(super) fn by_number(one: &Path, other: &Path) -> Ordering {
     let (one, other) = (one.to_string_lossy(), other.to_string_lossy());
     parts(&one).cmp(parts(&other)).then_with(|| one.cmp(&other))
@@ -72,7 +70,6 @@ pub(super) fn by_number(one: &Path, other: &Path) -> Ordering {
 
 /// A name in parts: each number, without leading zeros, by its length and digits, and each other
 /// character.
-#[cfg(feature = "pictures")]
 fn parts(name: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut left = name;
     std::iter::from_fn(move || {
@@ -107,7 +104,6 @@ mod tests {
         assert_eq!(measurement_files(&[root.path().to_owned()]).unwrap(), names);
     }
 
-    #[cfg(feature = "pictures")]
     #[test]
     fn names_that_count_are_in_the_order_of_their_numbers() {
         let mut names = ["p10", "p9", "p009b", "p1", "q0", "p", "p01"].map(Path::new);

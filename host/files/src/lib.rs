@@ -21,7 +21,6 @@ pub mod contents;
 #[cfg(not(target_family = "wasm"))]
 pub mod folder;
 pub mod identity;
-#[cfg(feature = "pictures")]
 pub mod image;
 pub mod interrupt;
 #[cfg(not(target_family = "wasm"))]
@@ -43,7 +42,7 @@ mod field;
 mod fields;
 #[cfg(not(target_family = "wasm"))]
 mod formats;
-#[cfg(feature = "hdf5")]
+#[cfg(not(target_family = "wasm"))]
 mod hdf5;
 #[cfg(not(target_family = "wasm"))]
 mod mat;

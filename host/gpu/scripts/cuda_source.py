@@ -93,7 +93,7 @@ def toolkit() -> pathlib.Path:
 
 def write_source(folder: pathlib.Path, cards: list[str]) -> None:
     """The files of the example."""
-    command = ["cargo", "run", "--quiet", "--locked", "-p", "nirspi-nets", "--features", "source"]
+    command = ["cargo", "run", "--quiet", "--locked", "-p", "nirspi-nets", "--features", "gpu,nirspi-gpu/source"]
     command += ["--example", "cuda_source", "--", str(folder.resolve()), *cards]
     subprocess.run(command, check=True, cwd=ROOT)
 

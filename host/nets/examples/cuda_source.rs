@@ -1,7 +1,7 @@
 //! The CUDA source of every kernel of the shipped networks and of orthogonal matching pursuit,
 //! without a GPU: one file for each variant of each kernel, in a folder for each kind of GPU.
 //!
-//! `cargo run -p nirspi-nets --features source --example cuda_source -- FOLDER [CAPABILITY...]`
+//! `cargo run -p nirspi-nets --features gpu,nirspi-gpu/source --example cuda_source -- FOLDER [CAPABILITY...]`
 //!
 //! `CAPABILITY` is a compute capability without its point, such as 90 for an H100.
 //! `host/gpu/scripts/cuda_source.py` runs this example and compiles the files.
@@ -82,7 +82,7 @@ fn pursue(card: Card) -> Result<(), Box<dyn Error>> {
 /// The networks, with and without depth maps and agreement with the readings of all and of half of
 /// the patterns.
 fn enhance(card: Card, arithmetic: Arithmetic) -> Result<(), Box<dyn Error>> {
-    let device = Device::source(card).with_arithmetic(arithmetic);
+    let device = Device::on(card.into()).with_arithmetic(arithmetic);
     let [fsrcnn, estimator, bridge] = ["fsrcnn", "estimator", "diffusion"].map(Weights::embedded);
     let there = DeviceEnhancer::new(&device, &fsrcnn?, &estimator?, &bridge?)?;
     let half: Vec<u32> = (0..AREA as u32 / 2).collect();

@@ -71,17 +71,12 @@ impl Device {
         }
     }
 
+    /// This GPU.
     #[cfg(feature = "gpu")]
-    fn on(gpu: Gpu) -> Self {
+    #[must_use]
+    pub fn on(gpu: Gpu) -> Self {
         let name = gpu.name().to_owned();
         Self::of(Kind::Gpu(gpu), name)
-    }
-
-    /// A device that writes the CUDA source of its kernels, and gives zeros for results.
-    #[cfg(feature = "source")]
-    #[must_use]
-    pub fn source(card: nirspi_gpu::card::Card) -> Self {
-        Self::on(card.into())
     }
 
     /// The same device with this arithmetic. Where the device does not have it, networks compute in

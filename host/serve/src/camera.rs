@@ -73,7 +73,7 @@ pub struct CameraSource {
 /// Why a session ended.
 pub(super) enum End {
     /// The server is stopping.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     Told,
     /// The link to the camera is gone, for this reason in one line.
     Gone(String),
@@ -280,7 +280,7 @@ impl Live {
 
     /// The same on a thread of its own, whose load decides what the page gives up. `made` is the program, for the
     /// provenance in recordings.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub(super) fn on_its_thread(self, made: Made) -> Self {
         Self { load: Some((Instant::now(), Duration::ZERO)), made: Some(made), ..self }
     }
@@ -315,7 +315,7 @@ impl Live {
             Next::Person
         };
         match end {
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             End::Told => Next::Connect { person_said: false },
             // A person allowed light before another scene.
             End::Scene => Next::Connect { person_said: true },

@@ -5,10 +5,10 @@ use nirspi::account::FailedChecks;
 use nirspi::boards;
 use nirspi::clock::{self, Instant};
 use nirspi::events::Level;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use nirspi::feed::{Account, Header};
 use nirspi::identity::CameraIdentity;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use nirspi::provenance::{Origin, Taken};
 use nirspi::setup::MeasurementSetup;
 use nirspi::versions::{self, Part};
@@ -42,7 +42,7 @@ pub enum Phase {
     /// The link is gone; the thread tries to reconnect.
     Lost,
     /// A feed sends nothing.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     Silent,
 }
 
@@ -67,7 +67,7 @@ pub struct CameraState {
     /// The camera; `null` for a feed.
     identity: Option<CameraIdentity>,
     /// The feed, if readings come from one.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) feed: Option<FeedState>,
     versions: Vec<Part>,
@@ -79,7 +79,7 @@ pub struct CameraState {
 
 impl CameraState {
     /// Where the readings come from.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub fn taken(&self) -> Taken {
         match (&self.identity, &self.feed) {
             (Some(identity), _) => Taken::by(identity),
@@ -113,7 +113,7 @@ impl CameraState {
 }
 
 /// A feed, by its header, and what became of its numbers.
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 #[derive(Debug, Clone, Serialize)]
 pub struct FeedState {
     name: Option<String>,
@@ -186,7 +186,7 @@ impl CameraLog {
             leds_age_ms: 0,
             leds_known: Instant::now(),
             identity: Some(identity.clone()),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             feed: None,
             versions: Vec::new(),
             measurement: None,
@@ -198,7 +198,7 @@ impl CameraLog {
     }
 
     /// The log of a feed.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub fn of_feed(address: &str) -> Self {
         let camera = CameraState {
             address: address.to_owned(),
@@ -218,7 +218,7 @@ impl CameraLog {
     }
 
     /// Records that the header of a feed has come.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub fn fed(&mut self, header: &Header, taken: Taken) {
         self.camera.simulated = header.simulated == Some(true);
         let line = format!("{}, order {}", header.size(), header.order());

@@ -5,7 +5,7 @@ use super::delays::Passed;
 use super::line::Line;
 use super::look::{Look, Measured};
 use super::moving::Moving;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use super::own::OwnImages;
 use super::picture::{CHOSEN_EVERY, Enhancement, Picture, PictureError, made_of, ms_since};
 use super::settings::{Offer, Settings, alternatives};
@@ -57,7 +57,7 @@ pub struct Imaging {
     device: Device,
     models: Vec<Model>,
     /// Images of patterns of a bench's own, if it shows such.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     own: Option<OwnImages>,
     /// The learned stages with the network of this name.
     enhance: (&'static str, Enhance),
@@ -107,7 +107,7 @@ impl Imaging {
             methods,
             device,
             models,
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             own: None,
             enhance,
         })
@@ -118,7 +118,7 @@ impl Imaging {
     ///
     /// # Errors
     /// [`ImagingError::Method`] if the method needs Hadamard rows.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub fn of_own_patterns(mut self, method: Method) -> Result<Self, ImagingError> {
         self.own = Some(OwnImages::new(method, &self.settings)?);
         let is_ours = |method: Method| method.with_matrix().is_some();
@@ -129,7 +129,7 @@ impl Imaging {
 
     /// Whether images by this method can start from the images before.
     fn can_remember(&self, prepared: &Prepared) -> bool {
-        #[cfg(feature = "server")]
+        #[cfg(not(target_family = "wasm"))]
         if self.own.is_some() {
             return false;
         }
@@ -346,7 +346,7 @@ impl Imaging {
         let started = Instant::now();
         let (measurements, frame_warnings) = match look.measured(self.remembers(settings))? {
             Measured::Hadamard { measurements, warnings } => (measurements, warnings),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Measured::Own(plain) => {
                 let own = self.own.as_mut().ok_or(PictureError::Method(settings.method))?;
                 return own.picture(&plain, look, settings, white, shared);

@@ -17,26 +17,26 @@
 //! delay to each stage is measured (`delays.rs`). If the computer is too slow for the camera, the page
 //! gives up images, then enhancement (`overload.rs`).
 
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod access;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod base_path;
 mod begin;
 mod camera;
 mod camera_log;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod change_rate;
 mod commands;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod connections;
 mod delays;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod feed;
-#[cfg(all(fuzzing, feature = "server"))]
+#[cfg(all(fuzzing, not(target_family = "wasm")))]
 pub mod fuzzing;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod guard;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod http;
 mod imaging;
 mod light;
@@ -44,16 +44,16 @@ mod line;
 mod look;
 mod moving;
 mod overload;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod own;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod page;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod pages;
 mod picture;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod rest;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod server;
 pub mod settings;
 mod simulated;
@@ -61,31 +61,31 @@ mod slot;
 mod stage;
 mod state;
 mod sync;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod threads;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 mod token;
 mod turns;
 
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub use access::{Access, HostName, HostNameError};
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub use base_path::{BasePath, BasePathError};
 pub use begin::TurnsError;
 pub use camera::{CameraSource, Connect, Connected};
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub use feed::FeedSource;
 pub use imaging::{Imaging, ImagingError};
 pub use line::Line;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub use look::BenchError;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub use server::{BindError, Server};
 pub use slot::{ImageCounters, Ledger};
 pub use stage::StagedScene;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub use threads::{ServeError, Served, serve, serve_feed};
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub use token::{Token, TokenError};
 pub use turns::Turns;
 
@@ -123,7 +123,7 @@ struct Shared {
     over: AtomicBool,
     viewers: AtomicUsize,
     /// The pages that ask for states.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pages: Mutex<pages::Pages>,
 }
 
@@ -141,7 +141,7 @@ impl Shared {
             overload: Mutex::default(),
             over: AtomicBool::new(false),
             viewers: AtomicUsize::new(0),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             pages: Mutex::default(),
         }
     }
@@ -152,9 +152,9 @@ impl Shared {
 
     /// Number of pages, and of scripts that read the stream of states.
     fn viewers(&self) -> usize {
-        #[cfg(feature = "server")]
+        #[cfg(not(target_family = "wasm"))]
         let pages = lock(&self.pages).count(tokio::time::Instant::now());
-        #[cfg(not(feature = "server"))]
+        #[cfg(target_family = "wasm")]
         let pages = 0;
         pages + self.viewers.load(Ordering::Relaxed)
     }
@@ -186,5 +186,4 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 #[cfg(test)]
-#[cfg(feature = "server")]
 mod tests;

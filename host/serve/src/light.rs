@@ -20,7 +20,7 @@ pub enum Leds {
     /// The link to the camera is gone. The camera switches its LEDs off by itself.
     Unknown,
     /// There are none that this program could switch: readings come from a feed.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     None,
 }
 

@@ -3,23 +3,23 @@
 use nirspi::account::LossCounters;
 use nirspi::calibration::FlatField;
 use nirspi::clock::Instant;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use nirspi::feed::{Header, OwnPatterns, mean};
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use nirspi::files::FileError;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use nirspi::files::measurement::{Plain, PlainSweeps, Sweeps};
 use nirspi::integrate::{IntegrateError, Newest};
 use nirspi::moving::followed;
 use nirspi::response::Settling;
 use nirspi::setup::MeasurementSetup;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use nirspi::source::{Source, SourceError};
 use nirspi_nets::DepthMaps;
 use nirspi_recon::Measurements;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use std::fmt;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
@@ -63,12 +63,12 @@ pub enum Seen {
     /// The frames, how they were measured, and the newest depth map.
     Camera { frames: Box<Newest>, run: Arc<RunSetup>, depth: Option<Arc<DepthImage>> },
     /// Frames of a feed, and what they are.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     Feed { frames: Vec<Arc<[f64]>>, bench: Arc<Bench> },
 }
 
 /// A feed: everything needed to interpret its frames.
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 pub struct Bench {
     /// The header.
     pub header: Header,
@@ -79,7 +79,7 @@ pub struct Bench {
 }
 
 /// What makes measurements of readings.
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 enum Shown {
     /// Of Hadamard patterns.
     Hadamard(Box<Sweeps>),
@@ -88,7 +88,7 @@ enum Shown {
 }
 
 /// Why the frames of a feed cannot be interpreted.
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum BenchError {
@@ -103,7 +103,7 @@ pub enum BenchError {
     File(#[from] FileError),
 }
 
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 impl Bench {
     /// The feed of this name with this header, and the file of its own patterns, if it shows such.
     pub fn new(name: &str, header: &Header, matrix: Option<&Path>) -> Result<Self, BenchError> {
@@ -123,7 +123,7 @@ impl Bench {
     }
 }
 
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 impl fmt::Debug for Bench {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Bench").field("origin", &self.origin).finish_non_exhaustive()
@@ -136,7 +136,7 @@ pub enum Run {
     /// A run of a camera.
     Camera(Arc<RunSetup>),
     /// A feed from its header to its end.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     Feed(Arc<Bench>),
 }
 
@@ -151,7 +151,7 @@ pub enum Measured {
         warnings: Vec<String>,
     },
     /// By patterns of a bench's own.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     Own(Plain),
 }
 
@@ -162,11 +162,11 @@ pub enum MeasuredError {
     #[error(transparent)]
     Camera(#[from] IntegrateError),
     /// The frames of a feed.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     #[error(transparent)]
     Feed(#[from] SourceError),
     /// The frames of a feed of its own patterns.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     #[error(transparent)]
     Own(#[from] FileError),
 }
@@ -176,9 +176,9 @@ impl Run {
     pub fn is_of(&self, look: &Look) -> bool {
         match (self, &look.seen) {
             (Self::Camera(own), Seen::Camera { run, .. }) => Arc::ptr_eq(own, run),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             (Self::Feed(own), Seen::Feed { bench, .. }) => Arc::ptr_eq(own, bench),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             _ => false,
         }
     }
@@ -189,7 +189,7 @@ impl Look {
     pub fn run(&self) -> Run {
         match &self.seen {
             Seen::Camera { run, .. } => Run::Camera(Arc::clone(run)),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Seen::Feed { bench, .. } => Run::Feed(Arc::clone(bench)),
         }
     }
@@ -198,7 +198,7 @@ impl Look {
     pub fn frames(&self) -> u64 {
         match &self.seen {
             Seen::Camera { frames, .. } => frames.frames(),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Seen::Feed { frames, .. } => frames.len() as u64,
         }
     }
@@ -218,7 +218,7 @@ impl Look {
                 };
                 Ok(Measured::Hadamard { measurements, warnings })
             }
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Seen::Feed { frames, bench } => {
                 let sweeps = match &bench.sweeps {
                     Shown::Hadamard(sweeps) => sweeps,
@@ -236,7 +236,7 @@ impl Look {
     pub fn flat_field(&self) -> Option<&FlatField> {
         match &self.seen {
             Seen::Camera { run, .. } => run.flat_field.as_ref(),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Seen::Feed { .. } => None,
         }
     }
@@ -245,7 +245,7 @@ impl Look {
     pub fn depth(&self) -> Option<&Arc<DepthImage>> {
         match &self.seen {
             Seen::Camera { depth, .. } => depth.as_ref(),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Seen::Feed { .. } => None,
         }
     }
@@ -257,7 +257,7 @@ impl Look {
                 let setup = &run.setup;
                 (setup.order.clone(), setup.rows.len(), setup.sweeps)
             }
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Seen::Feed { bench, .. } => (bench.header.order(), bench.header.patterns(), 1),
         }
     }
@@ -266,7 +266,7 @@ impl Look {
     pub fn unit(&self) -> String {
         match &self.seen {
             Seen::Camera { .. } => "ADC counts".to_owned(),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             Seen::Feed { bench, .. } => bench.header.unit.clone().unwrap_or_default(),
         }
     }

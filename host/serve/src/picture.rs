@@ -7,7 +7,7 @@ use nirspi::account::LossCounters;
 use nirspi::clock::{self, Instant};
 use nirspi::imaging::EnhanceError;
 use nirspi_nets::WeightsError;
-#[cfg(feature = "server")]
+#[cfg(not(target_family = "wasm"))]
 use nirspi_own::MatrixError;
 use nirspi_recon::reconstruct::ReconstructError;
 use nirspi_recon::{Image, Shape};
@@ -47,7 +47,7 @@ pub struct Picture {
     #[serde(skip)]
     pub depth: Option<Arc<DepthImage>>,
     /// When the newest frame came out of the link.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     #[serde(skip)]
     pub arrived: Instant,
     /// The same on the clock of the computer that reads the camera, in milliseconds since 1970.
@@ -80,7 +80,7 @@ pub struct Picture {
 
 impl Picture {
     /// The reconstructed image, (height, width) in [0, 1], with white at 1.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub fn shares_of_white(&self) -> Vec<f32> {
         let scale = if self.white_counts > 0.0 { 1.0 / self.white_counts } else { 0.0 };
         self.counts.iter().map(|value| (value * scale).clamp(0.0, 1.0)).collect()
@@ -100,7 +100,7 @@ pub(super) enum PictureError {
     #[error(transparent)]
     Reconstruct(#[from] ReconstructError),
     /// The patterns of a feed, or a setting, give no image.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     #[error(transparent)]
     Matrix(#[from] MatrixError),
     /// The image has a pixel that is not finite.
@@ -135,7 +135,7 @@ pub(super) fn made_of(
         half_width: None,
         readings: None,
         depth: look.depth().cloned(),
-        #[cfg(feature = "server")]
+        #[cfg(not(target_family = "wasm"))]
         arrived: look.arrived,
         arrived_unix_ms: (clock::since_1970().saturating_sub(look.arrived.elapsed())).as_millis()
             as u64,

@@ -10,9 +10,9 @@ use super::lock;
 use super::sync::{Condvar, Mutex};
 use nirspi::account::LossCounters;
 use serde::Serialize;
-#[cfg(any(test, feature = "server"))]
+#[cfg(not(target_family = "wasm"))]
 use std::sync::PoisonError;
-#[cfg(any(test, feature = "server"))]
+#[cfg(not(target_family = "wasm"))]
 use std::time::Duration;
 
 /// The account of frames and images.
@@ -95,7 +95,7 @@ impl<T> Slot<T> {
 
     /// Takes the newest look, if there is one within `patience` and before [`wake`](Self::wake).
     /// The caller must then call [`done`](Self::done) or [`leave`](Self::leave).
-    #[cfg(any(test, feature = "server"))]
+    #[cfg(not(target_family = "wasm"))]
     pub fn take(&self, patience: Duration) -> Option<T> {
         let inner = lock(&self.inner);
         let idle = |inner: &mut Inner<T>| inner.next.is_none() && !inner.news;
@@ -106,7 +106,7 @@ impl<T> Slot<T> {
     }
 
     /// Waits for [`wake`](Self::wake) alone, and leaves the newest look in the slot.
-    #[cfg(any(test, feature = "server"))]
+    #[cfg(not(target_family = "wasm"))]
     pub fn await_news(&self, patience: Duration) {
         let waited =
             self.filled.wait_timeout_while(lock(&self.inner), patience, |inner| !inner.news);

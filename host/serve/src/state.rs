@@ -159,18 +159,18 @@ struct Message<'s> {
 #[derive(Debug, Default)]
 pub struct Published {
     /// The number of the state.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub number: u64,
     /// When the state was made; `None` before the first.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub made: Option<Instant>,
     /// The state as JSON, without pixels.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub state: String,
     /// The state as JSON, with pixels.
     pub message: String,
     /// The images.
-    #[cfg(feature = "server")]
+    #[cfg(not(target_family = "wasm"))]
     pub picture: Option<Arc<Picture>>,
 }
 
@@ -195,13 +195,13 @@ impl Published {
         };
         Ok(Self {
             message: serde_json::to_string(&message)?,
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             number: state.number,
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             made: Some(Instant::now()),
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             state: serde_json::to_string_pretty(state)?,
-            #[cfg(feature = "server")]
+            #[cfg(not(target_family = "wasm"))]
             picture: picture.cloned(),
         })
     }

@@ -6,11 +6,8 @@ const FILES: &[(&str, &[u8])] = &[
     ("level5.mat", include_bytes!("../small/level5.mat")),
     ("level5_compressed.mat", include_bytes!("../small/level5_compressed.mat")),
     ("level4.mat", include_bytes!("../small/level4.mat")),
-    #[cfg(feature = "hdf5")]
     ("level73.mat", include_bytes!("../small/level73.mat")),
-    #[cfg(feature = "hdf5")]
     ("h5py.h5", include_bytes!("../small/h5py.h5")),
-    #[cfg(feature = "hdf5")]
     ("lzf.h5", include_bytes!("../small/lzf.h5")),
 ];
 
@@ -41,11 +38,9 @@ fn bytes_that_would_become_gigabytes_of_numbers_are_refused_before_they_are_read
     let axes = [6, 0, 0, 0, 1, 0, 0, 0];
     let at = mat.windows(8).position(|bytes| bytes == axes).unwrap();
     mat[at..at + 8].copy_from_slice(&[0, 0x40, 0, 0, 0, 0x20, 0, 0]);
-    for (name, bytes) in [
-        ("claims.mat", &mat[..]),
-        #[cfg(feature = "hdf5")]
-        ("claims.h5", include_bytes!("../small/claims.h5")),
-    ] {
+    for (name, bytes) in
+        [("claims.mat", &mat[..]), ("claims.h5", include_bytes!("../small/claims.h5"))]
+    {
         let (_folder, path) = file(name, bytes);
         let mut fields = Fields::open(&path, false).unwrap();
         let told = line(&fields.read("y", |_| Ok(())).unwrap_err(), name);
@@ -55,7 +50,6 @@ fn bytes_that_would_become_gigabytes_of_numbers_are_refused_before_they_are_read
 }
 
 /// h5py wrote the file, of `np.float16`.
-#[cfg(feature = "hdf5")]
 #[test]
 fn numbers_of_half_precision_in_hdf5_are_named_with_what_to_save_instead() {
     let (_folder, path) = file("half.h5", include_bytes!("../small/float16.h5"));
@@ -125,7 +119,6 @@ fn a_matrix_without_numbers_is_read_whatever_its_shape() {
 }
 
 /// h5py refuses such a file too, by the end-of-file address. Arrays before the cut could be read.
-#[cfg(feature = "hdf5")]
 #[test]
 fn an_hdf5_file_that_was_cut_is_refused_wherever_it_was_cut() {
     for (name, bytes) in [
@@ -150,11 +143,9 @@ fn an_hdf5_file_that_was_cut_is_refused_wherever_it_was_cut() {
 #[test]
 fn arrays_in_structures_and_groups_are_named_by_their_path() {
     let structure: &[u8] = include_bytes!("../small/nested.mat");
-    for (name, bytes, between) in [
-        ("nested.mat", structure, '.'),
-        #[cfg(feature = "hdf5")]
-        ("nested.h5", include_bytes!("../small/nested.h5"), '/'),
-    ] {
+    for (name, bytes, between) in
+        [("nested.mat", structure, '.'), ("nested.h5", include_bytes!("../small/nested.h5"), '/')]
+    {
         let (folder, path) = file(name, bytes);
         let _kept = folder;
         let of = |path: &str| path.replace('.', &between.to_string());

@@ -3,6 +3,9 @@
 use super::FileError;
 use crate::array::{has_shape, shape_text};
 use crate::fields::{Fields, UNNAMED};
+use crate::folder::by_number;
+use crate::image::{pictures_in, read_grey};
+use crate::plain::MAX_MEMORY_BYTES;
 use nirspi_recon::Size;
 use std::borrow::Cow;
 use std::path::Path;
@@ -197,12 +200,7 @@ impl<'p> PatternArray<'p> {
 }
 
 /// The pictures of a folder, in the order of the numbers in their names: grey levels from 0 to 1.
-#[cfg(feature = "pictures")]
 fn pictures(folder: &Path) -> Result<(String, Vec<usize>, Vec<f64>), FileError> {
-    use crate::folder::by_number;
-    use crate::image::{pictures_in, read_grey};
-    use crate::plain::MAX_MEMORY_BYTES;
-
     let mut files = pictures_in(folder)?;
     files.sort_by(|a, b| by_number(a, b));
     let (mut weights, mut first) = (Vec::new(), None);
@@ -234,12 +232,6 @@ fn pictures(folder: &Path) -> Result<(String, Vec<usize>, Vec<f64>), FileError> 
             "PNG files, a pattern each, or a file of patterns",
         )),
     }
-}
-
-#[cfg(not(feature = "pictures"))]
-fn pictures(folder: &Path) -> Result<(String, Vec<usize>, Vec<f64>), FileError> {
-    let expected = "a file of patterns, or a build with the feature pictures";
-    Err(FileError::kind(folder, "a folder, which this build does not read", expected))
 }
 
 /// The array of the patterns in a file: its name, shape and numbers.

@@ -26,7 +26,6 @@ fn page() -> Turns {
 fn of_rows(measured: Measured) -> (Measurements, Vec<String>) {
     match measured {
         Measured::Hadamard { measurements, warnings } => (measurements, warnings),
-        #[cfg(feature = "server")]
         Measured::Own(_) => panic!("a camera"),
     }
 }

@@ -14,6 +14,8 @@ use std::collections::{HashMap, VecDeque};
 use std::format;
 use std::println;
 use std::string::String;
+use std::sync::Mutex;
+use std::thread;
 use std::vec;
 use std::vec::Vec;
 use world::{Action, Trouble, World};
@@ -234,30 +236,46 @@ fn every_reachable_state_keeps_the_laws_of_light() {
     hold(walks());
 }
 
+/// Checks each walk. As many threads as the machine has processors take one walk after another.
 fn hold(walks: Vec<Walk>) {
-    let mut total = (0, 0);
-    for walk in walks {
-        let (name, begun) = (walk.name, std::time::Instant::now());
-        let graph = Graph::walk(&walk);
-        let states = graph.notes.len();
-        let steps = graph.edges.iter().filter(|&&edge| edge != NONE).count();
-        // Time passes, troubles end, the link closes, and a host greets and acknowledges what has latched.
-        let repairs = |action| {
-            use Action::{Close, Configure, End, Hello, Poll, Tick};
-            matches!(action, Tick | Poll | Close | End(_) | Hello | Configure)
-        };
-        let dark = graph.farthest(|note| note.dark_and_idle, repairs).unwrap();
-        let lit = graph.farthest(|note| note.shines, |_| true).unwrap();
-        let silent = graph.longest_run(&[Action::Tick]).unwrap();
-        let asked = graph.longest_run(&[Action::Status, Action::Tick]).unwrap();
-        println!(
-            "{name}: {states} states, {steps} steps, depth {}; at most {dark} actions to a dark idle \
-             state, {lit} to light, {silent} ticks until a run without a host ends, {asked} until \
-             a run without frames ends; {:.1} s",
-            graph.depth,
-            begun.elapsed().as_secs_f64(),
-        );
-        total = (total.0 + states, total.1 + steps);
-    }
-    println!("{} states, {} steps", total.0, total.1);
+    let (left, total) = (Mutex::new(walks.into_iter()), Mutex::new((0, 0)));
+    let next = || left.lock().unwrap().next();
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some(walk) = next() {
+                    let (states, steps) = hold_one(&walk);
+                    let mut total = total.lock().unwrap();
+                    *total = (total.0 + states, total.1 + steps);
+                }
+            });
+        }
+    });
+    let (states, steps) = *total.lock().unwrap();
+    println!("{states} states, {steps} steps");
+}
+
+/// Checks a walk; its numbers of states and steps.
+fn hold_one(walk: &Walk) -> (usize, usize) {
+    let (name, begun) = (walk.name, std::time::Instant::now());
+    let graph = Graph::walk(walk);
+    let states = graph.notes.len();
+    let steps = graph.edges.iter().filter(|&&edge| edge != NONE).count();
+    // Time passes, troubles end, the link closes, and a host greets and acknowledges what has latched.
+    let repairs = |action| {
+        use Action::{Close, Configure, End, Hello, Poll, Tick};
+        matches!(action, Tick | Poll | Close | End(_) | Hello | Configure)
+    };
+    let dark = graph.farthest(|note| note.dark_and_idle, repairs).unwrap();
+    let lit = graph.farthest(|note| note.shines, |_| true).unwrap();
+    let silent = graph.longest_run(&[Action::Tick]).unwrap();
+    let asked = graph.longest_run(&[Action::Status, Action::Tick]).unwrap();
+    println!(
+        "{name}: {states} states, {steps} steps, depth {}; at most {dark} actions to a dark idle \
+         state, {lit} to light, {silent} ticks until a run without a host ends, {asked} until \
+         a run without frames ends; {:.1} s",
+        graph.depth,
+        begun.elapsed().as_secs_f64(),
+    );
+    (states, steps)
 }
