@@ -55,7 +55,7 @@ long() {
     done
     "$nirspi" eval quality --count 100 --sampler-count 8 --data "$data/chars74k" --scenes "$data/scenes" \
         --spi spi --out quality
-    cp quality/{blur,noise,steps,others,depth}.png "$docs/quality"
+    cp quality/{blur,noise,steps,others}.png "$docs/quality"
     "$examples/learned_prior" "$data" prior natural pictures
     cp prior/{prior_curves,prior_pictures}.png "$docs/reconstruction"
 }

@@ -34,8 +34,6 @@ const SHORTEST_US: u64 = 1000;
 /// The longest stretch, so that the window is 524 s. Oscillators of quartz drift by a few ppm with
 /// the temperature, which changes in minutes.
 const LONGEST_US: u64 = SHORTEST_US << 12;
-/// Length of the window in device time.
-pub const WINDOW_US: u64 = LONGEST_US * POINTS as u64;
 /// The largest drift of an oscillator, as a share. A clock beyond does not run in real time.
 const MOST_DRIFT: f64 = 5e-3;
 /// Where a device clock of 32 bits starts again.

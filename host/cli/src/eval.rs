@@ -102,14 +102,26 @@ impl ExposureArgs {
     }
 }
 
-/// The paper's own sampler.
+/// The pictures of Table 3 or 4, and where the report goes.
 #[derive(Debug, Args)]
-struct AncestralArgs {
+struct TakenArgs {
+    #[command(flatten)]
+    exposure: ExposureArgs,
     /// Steps of the paper's own sampler. The paper has 500 steps, which take fifty times as long as 10; 0 leaves the sampler
     /// out
-    #[arg(long = "ancestral", value_name = "STEPS", default_value_t = ANCESTRAL_STEPS,
+    #[arg(long, value_name = "STEPS", default_value_t = ANCESTRAL_STEPS,
           value_parser = clap::value_parser!(u32).range(0..=500))]
-    steps: u32,
+    ancestral: u32,
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+impl TakenArgs {
+    fn settings(&self, scenes: u32) -> Result<shot::Settings> {
+        let camera = self.exposure.model.read()?;
+        let exposure = self.exposure.exposure(&camera)?;
+        Ok(shot::Settings { scenes, camera, exposure, ancestral_steps: self.ancestral })
+    }
 }
 
 /// Where a table's report goes.

@@ -50,6 +50,11 @@ pub fn notes(notes: &[String]) -> Result<()> {
     notes.iter().try_for_each(note)
 }
 
+/// Prints how to interpret the numbers of a table.
+pub fn reading(lines: &[String]) -> Result<()> {
+    lines.iter().try_for_each(|text| line(format_args!("reading: {text}")))
+}
+
 /// Prints a report with its provenance as JSON.
 pub fn json(report: &(impl Serialize + ?Sized), provenance: &Provenance) -> Result<()> {
     line(provenance.sign(report)?.trim_end())

@@ -148,7 +148,6 @@ from_libraries!(
     nirspi_nets::weights::WeightsError,
     nirspi_nets::DepthError,
     nirspi_optics::CameraModelError,
-    nirspi_optics::ReliefError,
     nirspi_optics::SceneError,
     nirspi_optics::ProjectorError,
     nirspi_optics::rig::RigError,

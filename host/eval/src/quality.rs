@@ -12,14 +12,12 @@ mod characters;
 mod charts;
 mod condition;
 mod contenders;
-mod depth;
 mod measure;
 mod others;
 
 pub use characters::{Character, Characters, Origin};
 pub use condition::Condition;
 pub use contenders::{Contender, Method, Version};
-pub use depth::{Depth, DepthRow, Use as DepthUse};
 pub use measure::Figures;
 pub use others::Case;
 
@@ -87,8 +85,6 @@ pub struct Report {
     pub conditions: Vec<Figures>,
     /// Each method with each number of steps at the middle condition.
     pub steps: Vec<Figures>,
-    /// What the depth sensor adds, on scenes with two characters at two distances.
-    pub depth: Vec<DepthRow>,
     /// Results for scenes other than characters.
     pub others: Vec<Case>,
     /// Notes about stacks with fewer images than requested.
@@ -108,7 +104,6 @@ pub struct Study {
     characters: Characters,
     few: Characters,
     scenes: Vec<others::Scene>,
-    depth: depth::Tools,
 }
 
 /// The report, and its figures by name.
@@ -141,19 +136,7 @@ impl Study {
         let (contenders, stepped) = (ready(&Method::ALL)?, ready(&stepped(settings.most_steps))?);
         let bridge = Contender::new(Method::Diffusion(1), &mut networks)?;
         let weights = Version::all(&mut networks)?;
-        let depth = depth::Tools::new(&mut networks)?;
-        Ok(Self {
-            settings,
-            contenders,
-            stepped,
-            bridge,
-            weights,
-            judges,
-            characters,
-            few,
-            scenes,
-            depth,
-        })
+        Ok(Self { settings, contenders, stepped, bridge, weights, judges, characters, few, scenes })
     }
 
     /// Number of images to enhance.
@@ -161,7 +144,6 @@ impl Study {
     pub fn images(&self) -> usize {
         self.contenders.len() * conditions().len() * self.characters.len()
             + self.stepped.len() * self.few.len()
-            + depth::images(&self.characters)
     }
 
     /// Measures. `done` is called with the number of images just enhanced.
@@ -176,8 +158,6 @@ impl Study {
         let shown = others::enhance(&self.scenes, &self.bridge)?;
         let mut pictures = charts::all(&measured, &steps, characters, few);
         pictures.push(("others", shown.picture.into()));
-        let depth = depth::ablation(characters, &self.depth, seed, done)?;
-        pictures.push(("depth", depth.picture.into()));
         let report = Report {
             simulated: true,
             seed,
@@ -185,7 +165,6 @@ impl Study {
             weights: self.weights.clone(),
             conditions: measured,
             steps,
-            depth: depth.rows,
             others: shown.cases,
             notes: characters.notes().to_vec(),
         };

@@ -35,6 +35,19 @@ pub struct Exposure {
     pub seed: u64,
 }
 
+/// Settings of Tables 3 and 4.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Number of scenes at each distance, at least two; of Table 4 pictures of the edge, at least 10.
+    pub scenes: u32,
+    /// The camera.
+    pub camera: CameraModel,
+    /// The exposure of the pictures.
+    pub exposure: Exposure,
+    /// Steps of the ancestral sampler, the paper's method; 0 leaves out its row. The paper has 500.
+    pub ancestral_steps: u32,
+}
+
 /// The pictures of both cameras of one scene.
 pub struct Shots {
     /// The image of a perfect camera of 32 x 32 pixels.

@@ -15,7 +15,7 @@ use crate::bootstrap::{DRAWS, Redraws};
 use crate::error::{EvalError, Result};
 use crate::pictures::{Enhancers, Picture};
 use crate::quality::halved;
-use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
+use crate::shot::{CalibratedCamera, Conditions, Exposure, Settings, Shots};
 use crate::typefaces::{self, CHARACTERS, of_scene};
 use nirspi::imaging::{Fit, score, share_of_white};
 use nirspi::picture::{Figure, Panel, Range, SideBySide, Typeface, Unit};
@@ -30,27 +30,6 @@ use nirspi_recon::metrics::correlation;
 use rayon::prelude::*;
 use rows::{Measured, Statistics};
 use serde::Serialize;
-
-/// Settings of the measurement.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Number of scenes at each distance, at least two.
-    pub scenes: u32,
-    /// The camera.
-    pub camera: CameraModel,
-    /// The exposure of the pictures.
-    pub exposure: Exposure,
-    /// Steps of the ancestral sampler, the paper's method; 0 leaves out its row. The paper has 500.
-    pub ancestral_steps: u32,
-}
-
-impl Settings {
-    /// Number of pictures to take.
-    #[must_use]
-    pub fn pictures(&self) -> usize {
-        DISTANCES_M.len() * self.scenes as usize
-    }
-}
 
 /// A row of the paper: PSNR in dB, SSIM, FID. The paper's diffusion model is the ancestral sampler,
 /// with which nirspi's networks are compared.
@@ -118,6 +97,12 @@ pub struct Table {
 }
 
 impl Table {
+    /// Number of pictures to take.
+    #[must_use]
+    pub fn pictures(settings: &Settings) -> usize {
+        DISTANCES_M.len() * settings.scenes as usize
+    }
+
     /// Takes all pictures; `done` is called after each.
     ///
     /// # Errors
@@ -482,6 +467,6 @@ mod tests {
         let cost = rows[0]["psnr_db"]["value"].as_f64().unwrap()
             - rows[0]["dry_psnr_db"]["value"].as_f64().unwrap();
         assert!((first["psnr_db"]["value"].as_f64().unwrap() - cost).abs() < 1e-9, "{first}");
-        assert_eq!(settings.pictures(), 6);
+        assert_eq!(Table::pictures(&settings), 6);
     }
 }

@@ -14,33 +14,11 @@ use crate::pictures::{Enhancers, Picture};
 use crate::resolution::{
     bar_scene, bar_transfer, disc_transfer, edge_mtf, edge_scene, line_width_px, square_transfer,
 };
-use crate::shot::{CalibratedCamera, Conditions, Exposure, Shots};
+use crate::shot::{CalibratedCamera, Conditions, Exposure, Settings, Shots};
 use nirspi::picture::{Axis, Chart, Line};
 use nirspi_optics::{CameraModel, Projector, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
-
-/// Settings of the measurement.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Number of pictures of the edge at each distance, at least 10.
-    pub scenes: u32,
-    /// The camera.
-    pub camera: CameraModel,
-    /// The exposure of the pictures.
-    pub exposure: Exposure,
-    /// Steps of the ancestral sampler, the paper's method; 0 leaves out its row. The paper has 500.
-    pub ancestral_steps: u32,
-}
-
-impl Settings {
-    /// Number of pictures to take.
-    #[must_use]
-    pub fn pictures(&self) -> usize {
-        let bars = BARS_PX.len() as u32 * BAR_PICTURES;
-        DISTANCES_M.len() * (self.scenes + bars) as usize
-    }
-}
 
 /// Number of groups of pictures of the edge. Each group is left out once, and the spread of the
 /// results gives the interval.
@@ -151,6 +129,13 @@ struct Pictures {
     side: usize,
     edges: Vec<Vec<f32>>,
     bars: Vec<Vec<Vec<f32>>>,
+}
+
+/// Number of pictures to take.
+#[must_use]
+pub fn pictures_of(settings: &Settings) -> usize {
+    let bars = BARS_PX.len() as u32 * BAR_PICTURES;
+    DISTANCES_M.len() * (settings.scenes + bars) as usize
 }
 
 /// Takes all pictures and measures them; `done` is called after each picture.

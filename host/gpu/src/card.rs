@@ -10,16 +10,8 @@ pub struct Card {
 }
 
 impl Card {
-    /// T4 and RTX 20.
-    pub const TURING: Self = Self { capability: 75 };
-    /// A100.
-    pub const AMPERE: Self = Self { capability: 80 };
-    /// RTX 40.
-    pub const ADA: Self = Self { capability: 89 };
     /// H100 and H200.
     pub const HOPPER: Self = Self { capability: 90 };
-    /// RTX 50.
-    pub const BLACKWELL: Self = Self { capability: 120 };
 
     /// Largest shared memory of a workgroup, in bytes: the table of compute capabilities in NVIDIA's
     /// programming guide.

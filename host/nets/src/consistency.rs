@@ -12,7 +12,7 @@
 //! one. Then no image agrees with the readings, and the change only spoils what the network has made. The readings tell:
 //! where the new image, in [0, 1], is still farther from them than `REACHED`, and the change has taken less than 0.6 of the
 //! distance (`STUCK`), the old one stays. An image that is far off for another reason comes much nearer. A blur that the
-//! caller knows may be that of one part of the image ([`BlurZones`](crate::BlurZones)), so there images are always moved.
+//! caller knows may be that of one part of the image, so there images are always moved.
 //!
 //! # Invariant
 //! An image inside the ball is not changed (`tests::inside_the_ball_nothing_changes`), nor one whose readings no image of

@@ -23,7 +23,7 @@
 //! | the device | [`device`] |
 //! | stages | [`estimator`] (blur and noise), [`fusion`] (with depth), [`deblur`] |
 //! | all stages | [`enhance`] |
-//! | results | `choice`, [`interval`], [`zones`] |
+//! | results | `choice`, [`interval`] |
 
 mod arithmetic;
 mod blur;
@@ -60,7 +60,6 @@ mod separable;
 mod spread;
 pub mod upscale;
 pub mod weights;
-pub mod zones;
 
 pub use arithmetic::{Arithmetic, ParseArithmeticError};
 pub use choice::{Networks, UsedWeights};
@@ -79,4 +78,3 @@ pub use nirspi_weights::HELD_OUT;
 pub use note::Note;
 pub use upscale::{UpscaleError, upscale_2x};
 pub use weights::{Weights, WeightsError};
-pub use zones::BlurZones;

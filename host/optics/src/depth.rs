@@ -111,18 +111,6 @@ impl DepthGeometry {
         (tangent / half + 1.0) / 2.0 * DEPTH_SIDE as f64
     }
 
-    /// Width of a zone, as a difference of tangents.
-    pub(crate) fn zone_width(&self) -> f64 {
-        2.0 * (self.fov_deg.to_radians() / 2.0).tan() / DEPTH_SIDE as f64
-    }
-
-    /// The zone, along one axis (0 is across, 1 is down), that sees a point at `at_mm` from the
-    /// projector's axis on a plane at `distance_mm`; `None` if no zone does.
-    pub(crate) fn zone_of(&self, axis: usize, at_mm: f64, distance_mm: f64) -> Option<usize> {
-        let zone = self.zone(at_mm, self.offset_mm[axis], distance_mm);
-        (0.0..DEPTH_SIDE as f64).contains(&zone).then_some(zone as usize)
-    }
-
     /// The zones, along one axis, that see part of a field of `field_mm` on a plane at
     /// `distance_mm`.
     fn zones_of_field(

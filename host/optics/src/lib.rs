@@ -8,7 +8,6 @@
 //! | [`scene`] | a picture | reflectance on a target plane, in millimetres |
 //! | [`projector`] | scene and distance | [`Footprint`]: the reflectance that each LED's spot sees |
 //! | [`motion`] | scene and time | what each LED's spot sees of a target that moves |
-//! | [`relief`] | a picture and the distance of each pixel | the light of each LED, with the defocus of each distance |
 //! | [`budget`] | watts, apertures, distance | electrons per ADC sample for one LED, and for daylight |
 //! | [`mod@array`] | 32 row and 32 column lines | electrons per ADC sample for the LEDs they light |
 //! | [`edges`] | lines that change | the light on its way: LEDs that rise and LEDs that fall |
@@ -51,7 +50,6 @@ mod pose;
 pub mod projector;
 pub mod rain;
 pub mod range;
-pub mod relief;
 pub mod rig;
 pub mod safety;
 pub mod scene;
@@ -69,5 +67,4 @@ pub use instrument::{LEDS, SIDE, WAVELENGTH_NM};
 pub use motion::{Motion, MotionError, MovingTarget};
 pub use pose::Pose;
 pub use projector::{Footprint, Projector, ProjectorError};
-pub use relief::{Relief, ReliefError};
 pub use scene::{Scene, SceneError, Specular};

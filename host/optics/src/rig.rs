@@ -5,7 +5,7 @@
 //! default is two rows of three.
 
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, Normal, StandardNormal};
+use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use thiserror::Error;
 
@@ -141,23 +141,6 @@ impl Rig {
             }
         }
         Ok(volumes)
-    }
-
-    /// The nozzles moved at random by `rms_mm` in each direction, like those of a built rig.
-    ///
-    /// # Errors
-    /// [`RigError::Setting`] if the distance is negative.
-    pub fn with_scattered_nozzles(mut self, rms_mm: f64, seed: u64) -> Result<Self, RigError> {
-        let expected = "0 mm or more";
-        let error = RigError::Setting { name: "nozzle scatter", value: rms_mm, expected };
-        let spread = Normal::new(0.0, rms_mm).ok().filter(|_| rms_mm >= 0.0).ok_or(error)?;
-        let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        for nozzle in &mut self.nozzles_mm {
-            for (place, limit) in nozzle.iter_mut().zip(self.size_mm) {
-                *place = (*place + spread.sample(&mut rng)).clamp(0.0, limit);
-            }
-        }
-        Ok(self)
     }
 }
 

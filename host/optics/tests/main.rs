@@ -7,7 +7,6 @@ mod array;
 mod chain;
 mod depth;
 mod edges;
-mod eye_safety;
 mod mie;
 mod motion;
 mod projector;

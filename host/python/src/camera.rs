@@ -199,11 +199,6 @@ impl Camera {
         lock(&self.last).as_ref().map_or_else(Counted::default, |last| last.counted())
     }
 
-    #[getter]
-    fn is_virtual(&self) -> bool {
-        self.is_virtual
-    }
-
     /// What a perfect camera of these LEDs would see of the scene, 0 to 1.
     #[getter]
     fn truth<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f32>>> {

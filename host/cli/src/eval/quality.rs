@@ -15,8 +15,7 @@ use std::process::ExitCode;
 ///
 /// Sharp 64 x 64 images are blurred (Gaussian, sigma in pixels of 64), sampled to 32 x 32 by means of 2 x 2, given
 /// noise, and enhanced by every row: Lanczos, three classical methods that get blur and noise, and the networks, which
-/// get neither. Also says what the depth sensor adds to scenes with two characters at two distances. Writes quality.json,
-/// charts, and pictures of scenes that are no letters and of the two distances.
+/// get neither. Writes quality.json, charts, and pictures of scenes that are no letters.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n\
     \x20 nirspi eval quality --data chars74k/ --scenes scenes/ --spi spi/ --out quality/")]
@@ -105,11 +104,6 @@ fn say(args: &Args, report: &Report) -> Result<()> {
         }
         print::line(figures)?;
     }
-    print::line("two characters at two distances, by what is known of the distances:")?;
-    report.depth.iter().try_for_each(print::line)?;
     print::notes(&report.notes)?;
-    print::line(format_args!(
-        "wrote charts, others.png, depth.png and quality.json to {}",
-        args.out.display()
-    ))
+    print::line(format_args!("wrote charts, others.png and quality.json to {}", args.out.display()))
 }

@@ -59,8 +59,5 @@ fn say(report: &Report) -> Result<()> {
             row.symbol, row.stage
         ))?;
     }
-    for line in &report.reading {
-        print::line(format_args!("reading: {line}"))?;
-    }
-    Ok(())
+    print::reading(&report.reading)
 }

@@ -1,11 +1,11 @@
 //! `nirspi eval table3`: image quality in rain and without: NIR-SPI, VIS, and NIR-SPI enhanced by
 //! networks.
 
-use super::{AncestralArgs, ExposureArgs, OutputArgs};
+use super::TakenArgs;
 use crate::print;
 use crate::progress::Progress;
 use anyhow::Result;
-use nirspi_eval::table3::{Report, Row, Settings, Table};
+use nirspi_eval::table3::{Report, Row, Table};
 use std::process::ExitCode;
 
 /// Image quality in rain beside the paper's Table 3: NIR-SPI, VIS and the networks
@@ -22,27 +22,17 @@ pub struct Args {
           value_parser = clap::value_parser!(u32).range(2..=100_000))]
     scenes: u32,
     #[command(flatten)]
-    exposure: ExposureArgs,
-    #[command(flatten)]
-    ancestral: AncestralArgs,
-    #[command(flatten)]
-    output: OutputArgs,
+    taken: TakenArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let camera = args.exposure.model.read()?;
-    let settings = Settings {
-        scenes: args.scenes,
-        exposure: args.exposure.exposure(&camera)?,
-        camera,
-        ancestral_steps: args.ancestral.steps,
-    };
-    let bar = Progress::of("table 3", settings.pictures(), "pictures");
+    let settings = args.taken.settings(args.scenes)?;
+    let bar = Progress::of("table 3", Table::pictures(&settings), "pictures");
     let table = Table::take(settings, &|| bar.add(1))?;
     drop(bar);
     let report = table.report()?;
     let picture = || Ok(table.picture()?);
-    args.output.hand_over("table3", &report, picture, say)
+    args.taken.output.hand_over("table3", &report, picture, say)
 }
 
 fn say(report: &Report) -> Result<()> {
@@ -83,10 +73,7 @@ fn say(report: &Report) -> Result<()> {
             d.ssim.text(4)
         ))?;
     }
-    for line in &report.reading {
-        print::line(format_args!("reading: {line}"))?;
-    }
-    Ok(())
+    print::reading(&report.reading)
 }
 
 fn at(distance_m: Option<f64>) -> String {

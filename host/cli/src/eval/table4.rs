@@ -1,12 +1,12 @@
 //! `nirspi eval table4`: spatial resolution in rain, NIR-SPI, VIS and networks, by slanted edge and
 //! by bars.
 
-use super::{AncestralArgs, ExposureArgs, OutputArgs};
+use super::TakenArgs;
 use crate::print;
 use crate::progress::Progress;
 use anyhow::Result;
 use nirspi_eval::estimate::Estimate;
-use nirspi_eval::table4::{Report, Settings, chart, table4};
+use nirspi_eval::table4::{Report, chart, pictures_of, table4};
 use std::process::ExitCode;
 
 /// Spatial resolution in rain beside the paper's Table 4: NIR-SPI, VIS and networks, in mm on the target
@@ -24,26 +24,16 @@ pub struct Args {
           value_parser = clap::value_parser!(u32).range(20..=100_000))]
     scenes: u32,
     #[command(flatten)]
-    exposure: ExposureArgs,
-    #[command(flatten)]
-    ancestral: AncestralArgs,
-    #[command(flatten)]
-    output: OutputArgs,
+    taken: TakenArgs,
 }
 
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let camera = args.exposure.model.read()?;
-    let settings = Settings {
-        scenes: args.scenes,
-        exposure: args.exposure.exposure(&camera)?,
-        camera,
-        ancestral_steps: args.ancestral.steps,
-    };
-    let bar = Progress::of("table 4", settings.pictures(), "pictures");
+    let settings = args.taken.settings(args.scenes)?;
+    let bar = Progress::of("table 4", pictures_of(&settings), "pictures");
     let report = table4(&settings, &|| bar.add(1))?;
     drop(bar);
     let picture = || Ok(chart(&report).into());
-    args.output.hand_over("table4", &report, picture, say)
+    args.taken.output.hand_over("table4", &report, picture, say)
 }
 
 fn say(report: &Report) -> Result<()> {
@@ -71,8 +61,5 @@ fn say(report: &Report) -> Result<()> {
             row.paper_mm
         ))?;
     }
-    for line in &report.reading {
-        print::line(format_args!("reading: {line}"))?;
-    }
-    Ok(())
+    print::reading(&report.reading)
 }

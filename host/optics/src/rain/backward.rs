@@ -7,7 +7,7 @@
 //! bands of two degrees, and each drop class over sizes within 5 % of its own. Drops of a nozzle
 //! differ at least as much, and classes of a law of sizes are wider.
 
-use super::medium::{representative, size_parameter};
+use super::medium::{GOLDEN_RATIO, representative, size_parameter};
 use super::{Drops, RainError};
 use crate::mie::Mie;
 use crate::substance::Substance;
@@ -26,9 +26,6 @@ const SIZES: usize = 16;
 
 /// Half of the relative width over which a class is averaged.
 const SPREAD: f64 = 0.05;
-
-/// Fractional part of the golden ratio: its multiples spread most evenly over 0 to 1.
-const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 
 /// The phase function close to the direction back, with a mean of 1 over the sphere.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,5 @@
 //! The fall speed of drops, and its consequence for an exposure.
 
-/// Air density to which the fall-speed law belongs: sea level, 20 degrees C, in kg/m^3.
-pub const SEA_LEVEL_AIR_KG_PER_M3: f64 = 1.204;
-
 /// Terminal speed in still air at sea level: `9.65 - 10.3 exp(-0.6 D)` m/s, D in mm (Atlas,
 /// Srivastava and Sekhon, Rev. Geophys. 11, 1, 1973, a fit to Gunn and Kinzer's measurements from
 /// 0.6 to 5.8 mm). Below 0.109 mm, where the fit is negative, the speed is 0: small droplets stay
@@ -25,13 +22,6 @@ pub fn fall_speed_from_rest_m_per_s(diameter_mm: f64, height_m: f64) -> f64 {
         return 0.0;
     }
     terminal * (-(-2.0 * GRAVITY_M_PER_S2 * height_m / terminal.powi(2)).exp_m1()).sqrt()
-}
-
-/// Terminal speed in air of another density: multiplied by `(1.204 / density)^0.4` (Foote and du
-/// Toit, J. Appl. Meteorol. 8, 249, 1969).
-#[must_use]
-pub fn fall_speed_in_air_m_per_s(diameter_mm: f64, air_kg_per_m3: f64) -> f64 {
-    fall_speed_m_per_s(diameter_mm) * (SEA_LEVEL_AIR_KG_PER_M3 / air_kg_per_m3).powf(0.4)
 }
 
 /// Time in which a drop falls by twice its diameter, `2 D / v`, in seconds: the paper's tau_rain
@@ -84,14 +74,6 @@ mod tests {
         assert!((fall_speed_from_rest_m_per_s(2.0, 0.25) - 2.153).abs() < 2e-3);
         assert!((fall_speed_from_rest_m_per_s(2.0, 0.5) - 2.96).abs() < 1e-2);
         assert_eq!(fall_speed_from_rest_m_per_s(0.05, 1.0), 0.0);
-    }
-
-    #[test]
-    fn drops_fall_faster_in_thin_air() {
-        assert_eq!(fall_speed_in_air_m_per_s(2.0, 1.204), fall_speed_m_per_s(2.0));
-        // 2^0.4
-        let ratio = fall_speed_in_air_m_per_s(2.0, 0.602) / fall_speed_m_per_s(2.0);
-        assert!((ratio - 1.319_508).abs() < 1e-6, "{ratio}");
     }
 
     #[test]

@@ -116,7 +116,7 @@ const BINS: usize = 120;
 const SAMPLES: usize = 16;
 
 /// Fractional part of the golden ratio. Its multiples are distributed most evenly over 0 to 1.
-const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
+pub(super) const GOLDEN_RATIO: f64 = 0.618_033_988_749_895;
 
 /// First edge after 0, in radians: a twentieth of the diffraction lobe of an 8 mm drop in violet
 /// light.
