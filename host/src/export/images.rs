@@ -73,13 +73,14 @@ impl Images {
         let mut range = [f32::INFINITY, f32::NEG_INFINITY];
         each((whole, path), begins, |last, solved| {
             let Solved { image, with_readings, used, readings, .. } = solved;
-            for image in [&image, &with_readings] {
+            let with_readings = with_readings.as_ref().unwrap_or(&image);
+            for image in [&image, with_readings] {
                 let bytes: Vec<u8> = image.pixels().iter().flat_map(|p| p.to_le_bytes()).collect();
                 pixels.write_all(&bytes).map_err(wrong)?;
             }
             let ends = |[least, most]: [f32; 2], &pixel: &f32| [least.min(pixel), most.max(pixel)];
             range = image.pixels().iter().fold(range, ends);
-            levels.push(White::Brightest.level(&with_readings));
+            levels.push(White::Brightest.level(with_readings));
             known.push(OfImage { last, rows: used.rows().clone(), readings });
             Ok(())
         })?;

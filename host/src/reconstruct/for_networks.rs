@@ -47,7 +47,7 @@ impl ForNetworks {
 
     /// Adds an image.
     pub(super) fn push(&mut self, image: &FileImage) -> io::Result<()> {
-        let given = &image.with_readings;
+        let given = image.with_readings.as_ref().unwrap_or(&image.image);
         write_pixels(&mut self.pixels, given.pixels())?;
         let level = White::Brightest.level(given);
         match self.alike.last_mut() {

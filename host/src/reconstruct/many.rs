@@ -32,8 +32,8 @@ pub struct FileImage {
     pub index: Option<usize>,
     /// The image.
     pub image: Image,
-    /// The same with the readings as they are, for networks.
-    pub with_readings: Image,
+    /// The same with the readings as they are, for networks; `None` where that is the image itself.
+    pub with_readings: Option<Image>,
     /// The patterns that were used.
     pub used: Rows,
     /// The name of the order that chose them.

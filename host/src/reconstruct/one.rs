@@ -172,7 +172,7 @@ pub(super) fn one_image(
     });
     let (sharp, enhancement) = match networks {
         Some(networks) => {
-            let given = [(&with_readings, used.rows())];
+            let given = [(with_readings.as_ref().unwrap_or(&image), used.rows())];
             let (sharp, mut reports) = enhance_frames_by(networks.for_one(), &given, &mut times)?;
             (Some(sharp), reports.pop())
         }

@@ -96,18 +96,22 @@ impl Pipeline {
             true => sources.fit_together().map(|()| usize::MAX)?,
             false => AT_A_TIME,
         };
-        let (series, several, mut from) = (Series::of(&self.solver), sources.len() > 1, 0);
-        let mut batches = sources.batches(most)?;
-        let (writing, ended) = self.writing_beside(folder, &mut times, |times| {
-            let batch = times.time("read", || batches.next())?;
-            let part = Part { from, several };
-            let images = batch.map_err(PipelineError::from).and_then(|batch| {
-                times.time("reconstruct", || of_batch(&batch, &series, part, folder, watch))
-            });
-            from += images.as_ref().map_or(0, Vec::len);
-            Some(images)
+        let (series, several, mut number) = (Series::of(&self.solver), sources.len() > 1, 0);
+        let batches = sources.batches(most)?;
+        let (writing, ended) = thread::scope(|scope| {
+            let (to, from) = sync_channel(0);
+            // Ends when nobody wants more.
+            scope.spawn(move || batches.map(|batch| to.send(batch)).all(|sent| sent.is_ok()));
+            self.writing_beside(folder, &mut times, move |times| {
+                let batch = times.time("read", || from.recv()).ok()?;
+                let part = Part { from: number, several };
+                let images = batch.map_err(PipelineError::from).and_then(|batch| {
+                    times.time("reconstruct", || of_batch(&batch, &series, part, folder, watch))
+                });
+                number += images.as_ref().map_or(0, Vec::len);
+                Some(images)
+            })
         });
-        drop(batches);
         match writing {
             Some(writing) => {
                 writing.finish(Vec::new(), ended, self.networks.as_ref(), watch, times)

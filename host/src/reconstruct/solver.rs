@@ -56,8 +56,9 @@ pub struct Solved {
     /// The image in the readings' units, corrected by the flat field; of complex readings, the
     /// magnitude.
     pub image: Image,
-    /// The same with the readings as they are, for networks.
-    pub with_readings: Image,
+    /// The same with the readings as they are, for networks; `None` where that is the image itself, and of complex readings,
+    /// which networks do not take.
+    pub with_readings: Option<Image>,
     /// Of complex readings, the images of the real and of the imaginary part.
     pub parts: Option<[Image; 2]>,
     /// The measurements that were used.
@@ -219,8 +220,13 @@ impl Solver {
         let solved = |((((made, other), used), order), source): (_, &S)| {
             let source = source.borrow();
             let (made, other): (Reconstruction, Option<Reconstruction>) = (made, other);
-            let with_readings = source.flattened(made.with_readings(&used));
             let Reconstruction { image, report: made } = made;
+            let with_readings = match &other {
+                None => made.with_readings(image.pixels(), &used),
+                Some(_) => None,
+            };
+            let with_readings =
+                with_readings.map(|pixels| source.flattened(Image::new(image.side(), pixels)));
             let parts = other.map(|other| [image.clone(), other.image]);
             let image = match &parts {
                 None => image,

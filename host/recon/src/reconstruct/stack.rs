@@ -61,7 +61,7 @@ pub fn stack_while(
         return each(method, measurements, going_on);
     }
     let parts = measurements.chunks(AT_A_TIME).map(|part| part_of_stack(method, part, going_on));
-    Ok(parts.collect::<Result<Vec<_>, _>>()?.concat())
+    Ok(parts.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
 fn part_of_stack(
