@@ -101,14 +101,29 @@ impl Integrated {
 
     /// Adds one frame that [fits](Self::fits).
     pub fn add(&mut self, frame: &Frame<'_>) {
-        self.spread.add(frame.samples.iter(), u64::from(frame.sweeps));
-        self.add_alone(frame);
+        let sums: Vec<i64> = frame.samples.iter().collect();
+        self.add_read(frame, &sums);
+    }
+
+    /// As [`add`](Self::add), where the frame's sums were read before.
+    pub(crate) fn add_read(&mut self, frame: &Frame<'_>, sums: &[i64]) {
+        self.spread.add(sums.iter().copied(), u64::from(frame.sweeps));
+        self.add_read_alone(frame, sums);
     }
 
     /// Adds a frame that [fits](Self::fits) to a sum that is not asked what differs between its frames: it is one of a run of
     /// which more is [known](Self::of_run).
     pub fn add_alone(&mut self, frame: &Frame<'_>) {
-        self.accumulate(frame.samples.iter(), u64::from(frame.sweeps));
+        self.add_to_all(frame.samples.iter(), frame);
+    }
+
+    /// As [`add_alone`](Self::add_alone), where the frame's sums were read before.
+    pub(crate) fn add_read_alone(&mut self, frame: &Frame<'_>, sums: &[i64]) {
+        self.add_to_all(sums.iter().copied(), frame);
+    }
+
+    fn add_to_all(&mut self, sums: impl Iterator<Item = i64>, frame: &Frame<'_>) {
+        self.accumulate(sums, u64::from(frame.sweeps));
         self.places[phases::place_of(frame.sequence, frame.sweeps)] += u64::from(frame.sweeps);
         self.flags = self.flags.with(frame.flags);
     }

@@ -39,6 +39,8 @@ pub struct Tally {
     changes: Changes,
     /// The newest frames, each alone, with their numbers.
     newest: VecDeque<(u64, Arc<Integrated>)>,
+    /// The sums of the frame that is added: all that follows reads them again.
+    sums: Vec<i64>,
 }
 
 /// How an intact frame contradicts the setup.
@@ -229,6 +231,7 @@ impl Tally {
             phases: setup.alternates().then(Phases::default),
             changes: Changes::default(),
             newest: VecDeque::new(),
+            sums: Vec::new(),
         }
     }
 
@@ -236,11 +239,13 @@ impl Tally {
     pub fn packet(&mut self, content: &Result<DeviceMessage<'_>, PacketError>) -> bool {
         let counts = self.count.packet(content);
         if let (true, Ok(DeviceMessage::Frame(frame))) = (counts, content) {
-            self.integrated.add(frame);
+            self.sums.clear();
+            self.sums.extend(frame.samples.iter());
+            self.integrated.add_read(frame, &self.sums);
             self.keep(frame);
-            self.changes.add(frame.samples.iter(), frame.sweeps);
+            self.changes.add(self.sums.iter().copied(), frame.sweeps);
             if let Some(phases) = &mut self.phases {
-                phases.add(frame.sequence, frame.sweeps, frame.samples.iter());
+                phases.add(frame.sequence, frame.sweeps, self.sums.iter().copied());
             }
         }
         counts
@@ -251,7 +256,7 @@ impl Tally {
         let oldest = if self.newest.len() < NEWEST { None } else { self.newest.pop_front() };
         let sums = oldest.and_then(|(_, oldest)| Arc::into_inner(oldest));
         let mut alone = sums.map_or_else(|| self.integrated.empty(), Integrated::emptied);
-        alone.add_alone(frame);
+        alone.add_read_alone(frame, &self.sums);
         self.newest.push_back((frame.sequence.into(), Arc::new(alone)));
     }
 
