@@ -161,6 +161,7 @@ mod tests {
     use crate::testing::{noisy, scene, side};
     use crate::{Order, Rows};
     use std::sync::Mutex;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// Remembers the sizes of the kinds that it was asked for.
     struct Told(Box<dyn Reconstruct>, Mutex<Vec<usize>>);
@@ -245,6 +246,21 @@ mod tests {
             let method = prepared(word.parse().unwrap());
             let ended = stack_while(&method, &frames, &|| Err(ReconstructError::Stopped));
             assert_eq!(ended.err(), Some(ReconstructError::Stopped), "{word}");
+        }
+    }
+
+    #[test]
+    fn progress_is_told_of_each_image() {
+        let scene = scene(side(16), 1);
+        let frames: Vec<_> = (0..20).map(|k| noisy(&rows(0.5), &scene, 0.5, k)).collect();
+        for word in ["hadamard", "omp", "tikhonov", "fista", "tv"] {
+            let (method, begun) = (prepared(word.parse().unwrap()), AtomicUsize::new(0));
+            let count = || {
+                begun.fetch_add(1, Ordering::Relaxed);
+                Ok(())
+            };
+            stack_while(&method, &frames, &count).unwrap();
+            assert_eq!(begun.into_inner(), frames.len(), "{word}");
         }
     }
 

@@ -53,10 +53,10 @@ pub(in super::super) fn omp_kind(
     let mut solver = StackSolver::new(&pursuit, settings.backend, measurements.len())?;
     let mut made: Vec<OmpReconstruction> = Vec::with_capacity(measurements.len());
     while made.len() < measurements.len() {
-        going_on()?;
         let most = if solver.turns().has_device() { AT_A_TIME_ON_DEVICE } else { AT_A_TIME };
         let together = &measurements[made.len()..];
         let together = &together[..most.min(together.len())];
+        together.iter().try_for_each(|_| going_on())?;
         let values: Vec<f32> =
             together.par_iter().flat_map_iter(|measured| in_units(measured).0).collect();
         let (solutions, on_device) = solver.solve(&values)?;
