@@ -13,6 +13,7 @@ use nirspi_recon::reconstruct::{AT_A_TIME, Method, MethodSettings};
 use nirspi_recon::{Backend, Sampling};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 const PATTERNS: usize = 16;
 
@@ -117,10 +118,14 @@ fn images_before_a_wrong_measurement_are_written_with_the_reason() {
 fn a_stack_that_cannot_be_written_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = file(folder.path(), AT_A_TIME + 9, |_, _| ());
-    // Taken while the images are made.
+    // Taken while the images are made: those of the first batch are written beside the second.
     let image = folder.path().join("out/image.npy");
+    let begun = AtomicUsize::new(0);
     let take = || {
-        if image.parent().unwrap().exists() && !image.exists() {
+        if begun.fetch_add(1, Ordering::Relaxed) == AT_A_TIME {
+            while !image.parent().unwrap().exists() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
             std::fs::write(&image, b"mine").unwrap();
         }
         true
