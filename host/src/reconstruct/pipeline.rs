@@ -100,7 +100,7 @@ impl Pipeline {
         let batches = sources.batches(most)?;
         let (writing, ended) = thread::scope(|scope| {
             let (to, from) = sync_channel(0);
-            // Ends when nobody wants more.
+            // Also ends when the receiver is gone, because the run was stopped or has failed.
             scope.spawn(move || batches.map(|batch| to.send(batch)).all(|sent| sent.is_ok()));
             self.writing_beside(folder, &mut times, move |times| {
                 let batch = times.time("read", || from.recv()).ok()?;
@@ -190,7 +190,7 @@ impl Pipeline {
                 match images {
                     Ok(images) => {
                         if times.time("write", || to.send(images)).is_err() {
-                            // Writing has failed.
+                            // The writer has ended with an error, which `join` gives.
                             break;
                         }
                     }

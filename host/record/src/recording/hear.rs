@@ -79,7 +79,7 @@ fn each_packet<E: From<RecordingError>>(
             let mut packets = recording.map(|packet| packet.map(unsealed));
             loop {
                 let some: Vec<Result<Unsealed, _>> = packets.by_ref().take(TOGETHER).collect();
-                // Without a receiver, nobody wants more.
+                // The receiver is gone when the caller has ended with an error.
                 if some.is_empty() || to.send(some).is_err() {
                     break;
                 }
